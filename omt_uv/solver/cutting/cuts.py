@@ -51,7 +51,7 @@ class SeamFinder(Protocol):
 
     @property
     def is_again(self) -> bool:
-        """Whether what is wanted has missed its bound as it was cut before: a net, too."""
+        """Whether this is no first search: what was cut before, nets too, has missed its bound."""
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""

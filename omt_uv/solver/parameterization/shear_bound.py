@@ -19,7 +19,6 @@ from .chart_indices import but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear, measured_map
 from .convex_maps import with_figures
 from .mirrored_charts import mapped_anew
-from .options import ShearBound
 from .shear_search import MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, ShearSearch, joined, pressing_shear
 
 # Maps that are made at most.
@@ -93,8 +92,8 @@ def bound_shear(
     early = EarlyEnd()
     best = last = Round.of(search, first.charts, maps, first.found_cuts, search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
-    tried = {edge_set(last.cuts.edges)}
-    rehearsed, crossed, worse = dict[str, Any](), False, set[tuple[bytes, bytes]]()
+    tried, worse = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]]()
+    rehearsed, crossed = dict[str, Any](), False
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
             # What coarse maps tell does not hold here, or it is no use to part what lies on itself.
@@ -108,25 +107,20 @@ def bound_shear(
             # What is steep alone, as single triangles of a coarse mesh are, need not be slit.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
-                return _result(spared, search.shear, first.warnings, MORE_SEAMS)
+                return _result(spared, search, first.warnings, early)
         is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
         parting = _apart(search, last, crossing, rounds, worse)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):
             break
         apart, flat, crossed = parts
-        # Searches that hardly got on are long, and the next one would get no farther.
-        stuck = [k for k in last.searched if any(one.is_stuck for one in last.found_for(k))]
-        missed = [k for k in last.searched if k not in apart and k not in stuck]
-        if not missed and not apart:
+        missed = _to_be_searched(last, apart)
+        if not (missed or apart):
             break
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
-        kept = [but_within(last.cuts.edges, [last.charts[k] for k in (*missed, *flat)]), *apart.values()]
-        # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
-        changes = {"share": share, "adding": rounds > 1} | rehearsed
-        chosen = [*missed, *flat]  # What is left beside flat sides may need cuts of its own.
-        asked = _Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
+        changes = {"share": share, "adding": rounds > 1} | rehearsed  # Another draw may be worse, what is added is not.
+        asked = _Asked.of(last, missed, apart, flat, spread, changes, tried)
         anew = _cut_anew(search, last, asked, map_charts, early)
         new = yield from part_of(anew, begin + width * PARTING, width * (1 - PARTING))
         if new is None:
@@ -139,10 +133,7 @@ def bound_shear(
     best = last if last.excess <= best.excess else best
     if not early.is_asked:
         best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
-    # Another call need not search in vain what this one did.
-    search.memory.update(best.memory)
-    found = _result(best, search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
-    return replace(found, ended_early=early.is_asked)
+    return _result(best, search, first.warnings, early)
 
 
 @dataclass(frozen=True)
@@ -155,6 +146,29 @@ class _Asked:
     spread: np.ndarray
     changes: dict[str, Any]
     is_worth: Callable[[np.ndarray], bool]
+
+    @staticmethod
+    def of(
+        last: Round,
+        missed: list[int],
+        apart: dict[int, np.ndarray],
+        flat: list[int],
+        spread: np.ndarray,
+        changes: dict[str, Any],
+        tried: set[bytes],
+    ) -> _Asked:
+        """What is asked of charts of a round that missed the bound, and of what is left of those that come apart around
+        flat sides; worth a map is what was not tried."""
+        chosen = [*missed, *flat]
+        kept = [but_within(last.cuts.edges, [last.charts[k] for k in chosen]), *apart.values()]
+        return _Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
+
+
+def _to_be_searched(last: Round, apart: dict[int, np.ndarray]) -> list[int]:
+    """Charts to be searched again: not what comes apart, nor where a search has hardly got on, since such searches are
+    long and the next one would get no farther."""
+    stuck = [k for k in last.searched if any(one.is_stuck for one in last.found_for(k))]
+    return [k for k in last.searched if k not in apart and k not in stuck]
 
 
 def _cut_anew(search: ShearSearch, last: Round, asked: _Asked, map_charts, early: EarlyEnd) -> Steps[Round | None]:
@@ -358,12 +372,13 @@ def _slit(search: ShearSearch, last: Round, k: int, rounds: int) -> np.ndarray:
     return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images, rounds)
 
 
-def _result(last: Round, shear: ShearBound, warnings: tuple[str, ...], why: str) -> BoundedShear:
-    """The charts and maps of a round, with warnings of how they were made and of those that miss the bound; why they
-    do."""
-    by_hand = ~np.isin(np.arange(len(last.charts)), last.searched)
-    missed = tuple(shear.missed(last.mean, last.area, by_hand, why))
-    return BoundedShear(DiskCharts(last.charts, last.cuts, warnings), last.maps, missed)
+def _result(last: Round, search: ShearSearch, warnings: tuple[str, ...], early: EarlyEnd) -> BoundedShear:
+    """The charts and maps of a round, with warnings of how they were made and of those that miss the bound."""
+    by_hand, why = ~np.isin(np.arange(len(last.charts)), last.searched), ENDED_EARLY if early.is_asked else MORE_SEAMS
+    missed = tuple(search.shear.missed(last.mean, last.area, by_hand, why))
+    # Another call for the same search need not do in vain what this one did.
+    search.memory.update(last.memory)
+    return BoundedShear(DiskCharts(last.charts, last.cuts, warnings), last.maps, missed, early.is_asked)
 
 
 def in_pieces(

@@ -41,7 +41,7 @@ def steepness(result):
 
 def test_seams_bring_the_shear_under_the_bound(monkeypatch):
     # Whether it fills a texture is another question.
-    monkeypatch.setattr(unwrap_module, "COMPACT", np.inf)
+    monkeypatch.setattr(shear_bound, "COMPACT", np.inf)
     V, F = meshes.cap(rings=12, sectors=24, opening=0.85)
     surface = triangle_surface(V, F)
     assert max(mean_shear(unwrapped(surface, 0))) > 1.3
