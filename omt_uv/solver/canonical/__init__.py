@@ -8,6 +8,7 @@ from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
+    embeddings="evened_sites mean_value_sites",
     markers="ChartMarkers MapMarkers markers_of_chart",
     named_maps="NamedMap NamedProblem conformal_map polar_map",
     rectangles="natural_aspect rectangle_corners",

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from ..errors import PrecisionError
+from ..errors import FoldedUVError, PrecisionError
 from ..linalg.nested_dissection import LARGE, Dissection, mesh_order
 from ..linalg.sparse import Factor, solve_general
 from ..mesh.geometry import angles_from_lengths, halfedge_lengths
-from ..mesh.topology import halfedges
+from ..mesh.topology import halfedges, twins
 from .energy import Elements, energies_of, squared
 
 # Rounds at most in which weights are evened, and the share of its energy that one has to win for another one: each
@@ -23,6 +23,7 @@ WORTHWHILE = 0.3
 # Sides that are shorter than this share of the mean get so much of a convex boundary: faces between vertices that
 # nearly coincide would fold by rounding.
 LEAST_STEP = 1e-4
+NO_QUADS = np.zeros((0, 4), np.int64)
 
 
 def mean_value_weights(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -127,6 +128,48 @@ def _growth(faces: Elements, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray
 def _of_stars(faces: Elements, values: np.ndarray, n: int) -> np.ndarray:
     flat, area = faces.triangles.ravel(), faces.triangle_areas
     return np.bincount(flat, np.repeat(area * values, 3), n) / np.bincount(flat, np.repeat(area, 3), n)
+
+
+def released_vertices(
+    triangles: np.ndarray,
+    loop: np.ndarray,
+    side: np.ndarray,
+    corner: np.ndarray,
+    n: int,
+    quads: np.ndarray = NO_QUADS,
+) -> np.ndarray:
+    """Vertices (b,) bool of a boundary loop (b,) to take off the sides of a rectangle.
+
+    No inner edge runs along a side then, nor any diagonal of the quads (q,4): whichever way a quad is drawn, it has
+    three corners on that side. A cover of these edges: the vertices with most of them first.
+
+    Parameters
+    ----------
+    side, corner : (b,) the side of every vertex, and bool which are corners; n : how many vertices there are
+
+    Raises
+    ------
+    FoldedUVError : an edge joins two corners
+    """
+    position = np.full(n, -1)
+    position[loop] = np.arange(len(loop))
+    tail, head = halfedges(triangles)
+    inner = (twins(triangles) >= 0) & (tail < head)
+    ends = np.concatenate([np.column_stack([tail[inner], head[inner]]), quads[:, ::2], quads[:, 1::2]])
+    i, j = (position[np.unique(np.sort(ends, axis=1), axis=0)]).T
+    # A corner belongs to the side it starts and to the one before.
+    sides = np.stack([side, np.where(corner, (side - 1) % 4, side)])
+    same = (i >= 0) & (j >= 0) & (sides[:, None, i] == sides[None, :, j]).any((0, 1))
+    i, j = i[same], j[same]
+    released = np.zeros(len(loop), bool)
+    while len(i):
+        count = np.bincount(np.concatenate([i, j]), minlength=len(loop)) * ~corner
+        if not count.any():
+            raise FoldedUVError("Two corners of the square are joined by an edge within the chart")
+        released[count.argmax()] = True
+        left = ~(released[i] | released[j])
+        i, j = i[left], j[left]
+    return released
 
 
 def _weights(positions: np.ndarray, triangles: np.ndarray, equal: bool = False) -> csr_matrix:

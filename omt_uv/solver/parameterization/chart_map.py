@@ -33,6 +33,7 @@ from .initial_map import (
     InitialChartMap,
     coarse_initial_map,
     direct_initial_map,
+    evened_initial_map,
     flat_initial_map,
     good_enough,
     mean_value_sites,
@@ -340,7 +341,8 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:
                 return even
-        roomy = None if draft else roomy_initial_map(disk, log)
+    if not draft:
+        roomy = roomy_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log)
         if roomy is not None:
             return roomy
     if len(disk.vertices) > (DRAFT_ABOVE if draft else COARSE_ABOVE):

@@ -6,6 +6,7 @@ do. Coarsening goes on until the chart is small.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -13,13 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.density import density_of_vertices
+from ..canonical.embeddings import evened_sites, mean_value_sites
 from ..conformal.boundary_first import FlatDisk, boundary_first
-from ..errors import MeshError, PrecisionError, TransportError
+from ..errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from ..freed_memory import give_back_of
 from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
-from ..maps.tutte import arc_length_parameters, evened_tutte, tutte
+from ..maps.tutte import evened_tutte
 from ..maps.untangle import count_folds, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
@@ -75,8 +77,8 @@ HOPELESS = 50.0
 ISOMETRY = 1e-8
 # What is unrolled so that its outline lies on itself may be that far from one: shear of 1.02 to 1.1.
 UNROLLED = 1e-2
-# Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less, and
-# need no step of all vertices where sweeps bring the areas of a draft.
+# Drafts of charts with more vertices come by way of a coarser mesh, unless their log scale spreads less, and need no
+# step of all vertices where sweeps bring the areas of a draft.
 DRAFT_ABOVE = 600
 DRAFT_COARSE_ABOVE = 2000
 DRAFT_COARSER = 6
@@ -300,9 +302,8 @@ def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
     """A disk of a middle size with a free boundary, flattened as that comes or mapped by evened weights; None where
     neither gives it room."""
     n = len(disk.vertices)
-    if disk.boundary != "free" or not EVENED_ABOVE < n <= DIRECT_WITH_ROOM:
-        return None
-    if is_far(disk.target, face_areas(disk.vertices, disk.triangles)):
+    far = is_far(disk.target, face_areas(disk.vertices, disk.triangles))
+    if far or disk.boundary != "free" or not EVENED_ABOVE < n <= DIRECT_WITH_ROOM:
         return None
     with log.timed("flattening"):
         faces = elements(disk.vertices, disk.triangles, disk.target)
@@ -327,6 +328,18 @@ def _roomy_flat(disk: DiskMesh, faces: Elements) -> np.ndarray | None:
     w = flat @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
     return None if is_squeezed(energy(faces, w, SMOOTH_WEIGHT), SMOOTH_WEIGHT) else flat
+
+
+def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
+    """A disk of at most a middle size embedded in its domain by evened weights; None where that squeezes it. It
+    leaves as little to do as conformal map and transport, which take as long as all of the refinement."""
+    if len(disk.vertices) > DIRECT_WITH_ROOM or is_far(disk.target, face_areas(disk.vertices, disk.triangles)):
+        return None
+    faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
+    with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
+        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, ROOM)
+        return None if evened is None else InitialChartMap(evened)
+    return None
 
 
 def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
@@ -434,17 +447,3 @@ def _transport(sites, mass, domain: Domain, log: RunLog):
             return (yield from part_of(transport(sites, mass, domain), *TRANSPORT)), ""
         except (TransportError, PrecisionError) as error:
             return None, error.cause
-
-
-def mean_value_sites(vertices, triangles, loop, corners, domain: Domain) -> np.ndarray:
-    """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
-    if corners is not None:
-        from ..transport.inverse_map import corner_parameters
-
-        # Each side of the rectangle takes the boundary between two corners.
-        loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
-    share = arc_length_parameters(vertices, loop)
-    if corners is not None:
-        first = np.append(share[np.isin(loop, corners)], 1.0)
-        share = np.interp(share, first, corner_parameters(domain) / domain.period)
-    return tutte(vertices, triangles, loop, domain.map_boundary(share))

@@ -17,10 +17,10 @@ from ..linalg.sparse import Factor
 from ..maps.contacts import covers_itself
 from ..maps.development import developed
 from ..maps.energy import elements
-from ..maps.tutte import arc_length_parameters, tutte
+from ..maps.tutte import NO_QUADS, arc_length_parameters, released_vertices, tutte
 from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
 from ..mesh.geometry import dot3, face_areas, lengths, signed_areas
-from ..mesh.topology import expand, halfedges, twins
+from ..mesh.topology import expand
 from .projected_newton import CircleMotion, FreeMotion, LineMotion, Motion, linear_forms
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
@@ -47,7 +47,6 @@ FAR = 0.5
 BEYOND_REPAIR = 0.05
 # The same of an outline that is no outline.
 USELESS = 1e-3
-NO_QUADS = np.zeros((0, 4), np.int64)
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,7 @@ def notched_disk(start: InitialMap, triangles, loop) -> InitialMap | None:
     A part that one inner edge cuts off has all its boundary on an arc, and an arc encloses little.
     """
     everywhere = np.zeros(len(loop), np.int64)
-    released = _released(triangles, loop, everywhere, everywhere > 0, len(start.uv))
+    released = released_vertices(triangles, loop, everywhere, everywhere > 0, len(start.uv))
     if not released.any():
         return None
     radius = float(np.linalg.norm(start.uv[loop], axis=1).mean())
@@ -196,7 +195,7 @@ def _on_sides(mesh, s, half, reasons) -> InitialMap:
     s, corner = _snap_corners(s)
     places = _on_square(s) * half
     side = np.floor(s).astype(int)
-    released = _released(triangles, loop, side, corner, len(vertices), quads)
+    released = released_vertices(triangles, loop, side, corner, len(vertices), quads)
     if released.any():
         warnings.append(f"{released.sum()} boundary vertices leave the square, where a face would lie along a side")
     straight = _straighten(uv, vertices, triangles, loop[~released], places[~released], warnings)
@@ -324,33 +323,6 @@ def _snap_corners(s):
     snapped[order] = side + np.where(even, place / count[side], along)
     corner[at] = True
     return snapped, corner
-
-
-def _released(triangles, loop, side, corner, n, quads=NO_QUADS):
-    """Boundary vertices (b,) bool to take off the square's sides, so that no inner edge runs along a side, nor any
-    diagonal of the quads (q,4): whichever way a quad is drawn, it has three corners on that side then.
-
-    A cover of these edges: the vertices with most of them first.
-    """
-    position = np.full(n, -1)
-    position[loop] = np.arange(len(loop))
-    tail, head = halfedges(triangles)
-    inner = (twins(triangles) >= 0) & (tail < head)
-    ends = np.concatenate([np.column_stack([tail[inner], head[inner]]), quads[:, ::2], quads[:, 1::2]])
-    i, j = (position[np.unique(np.sort(ends, axis=1), axis=0)]).T
-    # A corner belongs to the side it starts and to the one before.
-    sides = np.stack([side, np.where(corner, (side - 1) % 4, side)])
-    same = (i >= 0) & (j >= 0) & (sides[:, None, i] == sides[None, :, j]).any((0, 1))
-    i, j = i[same], j[same]
-    released = np.zeros(len(loop), bool)
-    while len(i):
-        count = np.bincount(np.concatenate([i, j]), minlength=len(loop)) * ~corner
-        if not count.any():
-            raise FoldedUVError("Two corners of the square are joined by an edge within the chart")
-        released[count.argmax()] = True
-        left = ~(released[i] | released[j])
-        i, j = i[left], j[left]
-    return released
 
 
 def is_curved(vertices: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> bool:
