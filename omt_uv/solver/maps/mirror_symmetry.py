@@ -119,7 +119,7 @@ def mirror_symmetry(images: np.ndarray, phase: complex = 1.0, w: np.ndarray | No
     flips, factors = np.array([False, True, True, False]), np.array([1, phase, -phase, -1])
     rank = np.arange(n)
     if w is not None:
-        turned = w * np.sqrt(np.conj(phase))
+        turned = w * np.sqrt(np.conj(complex(phase)))
         rank = rank - n * (2 * (turned.imag > 0) + (turned.real > 0))
     lowest = np.argmin(rank[moves], axis=0)
     axes = np.sqrt(np.array([phase, -phase], complex))

@@ -82,3 +82,12 @@ def test_unknowns_are_all_symmetric_changes_that_leave_fixed_vertices(symmetry, 
     conditions = np.concatenate([spread.real, spread.imag, *stay], axis=1)
     rank = np.linalg.matrix_rank(found) if found.size else 0
     assert found.shape[1] == rank == 2 * n - np.linalg.matrix_rank(conditions)
+
+
+@pytest.mark.parametrize("phase", [1.0, -1.0, 1j])
+def test_representatives_are_on_one_side_of_any_axis(phase):
+    """An axis may be given as a real number, negative too."""
+    w = mirror_symmetry(ONE, phase).spread(some(6))
+    side = (w * np.sqrt(np.conj(complex(phase)))).imag
+    found = mirror_symmetry(ONE, phase, w)
+    assert (side[~found.follows] > -1e-12).all()
