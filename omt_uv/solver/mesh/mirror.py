@@ -19,7 +19,7 @@ from .topology import halfedges, pair_keys, pair_up, row_labels
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
 MIRROR_TOLERANCE = 1e-4
 # Polygons whose images are looked up before those of all others.
-PROBES = 40
+PROBES = 200
 # Planes across the axes and the principal directions, which come first.
 FIRST_PLANES = 6
 # Planes that are tried of those between a vertex and the others that are as far from the centre.
@@ -138,12 +138,16 @@ class _Polygons:
         centres = np.stack(sums, axis=1) / self.sides[:, None]
         self.middle = centres.mean(axis=0)
         self.points, self.centres = positions - self.middle, centres - self.middle
-        self.centre_tree = cKDTree(self.centres)
         self.probes = np.random.default_rng(0).permutation(len(self.sides))[:PROBES]
 
     @cached_property
+    def centre_tree(self) -> cKDTree:
+        """Of all centres: most meshes have no mirror, which their extents tell."""
+        return cKDTree(self.centres)
+
+    @cached_property
     def corner_tree(self) -> cKDTree:
-        """Of all corners: most meshes have no mirror, which their centres tell."""
+        """Of all corners: most of the others have no mirror, which their centres tell."""
         # A polygon's number, scaled beyond all distances, keeps its corners apart from those of others.
         return cKDTree(np.column_stack([self.points[self.vertex], 2 * self.extent * self.polygon]))
 
@@ -241,9 +245,10 @@ class _Polygons:
 
     def _matched(self, polygons: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
         """The polygons (p,) where the images of `polygons` (p,) lie, None unless each has one of as many sides."""
-        far, other = self.centre_tree.query(_reflected(self.centres[polygons], normal))
-        close = far.max() <= MIRROR_TOLERANCE * self.extent
-        return other if close and (self.sides[other] == self.sides[polygons]).all() else None
+        near = MIRROR_TOLERANCE * self.extent
+        # Where nothing is near, what is nearest takes long to find.
+        far, other = self.centre_tree.query(_reflected(self.centres[polygons], normal), distance_upper_bound=2 * near)
+        return other if far.max() <= near and (self.sides[other] == self.sides[polygons]).all() else None
 
 
 def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
