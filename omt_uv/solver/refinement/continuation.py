@@ -345,7 +345,7 @@ def minimise(
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
         met = value < limits.relaxed or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
-        nearly = residual < max(limits.foreseen, limits.loose_tolerance)
+        nearly = residual < max(limits.foreseen, limits.loose_tolerance) or left < limits.loose_tolerance
         # Limbs on a sphere trade their areas late: there only the last steps tell.
         if limits.foreseeing and not met and (nearly or limits.expecting):
             before, error = error, problem.area_error(w)

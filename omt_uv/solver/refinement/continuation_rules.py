@@ -32,7 +32,8 @@ Truth = bool | np.ndarray
 LOOSE = 3e-2
 # One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
 ON_THE_WAY = 0.1
-# One that will miss its goal is told by its areas where a step promises less than this: see `is_out_of_reach`.
+# One that will miss its goal is told by its areas where a step promises less than this, or next to nothing is left over
+# for another one: see `is_out_of_reach`.
 FORESEEN = 0.05
 # One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by
 # less than this share of the goal.
