@@ -51,27 +51,12 @@ class SymmetricSweeps:
 
     def _swept(self, rows: VertexRows, b: np.ndarray, w: np.ndarray, axes) -> np.ndarray | None:
         """The solution; None where it takes too many iterations."""
-        order, colours = rows.pattern.order, range(len(rows.pattern.first) - 1)
+        order = rows.pattern.order
         spread = affine_motions(self._part[order], int(self._part.max()) + 1, w[order], axes()[order])
         give_back()
         coarse, gather = self._coarse(rows, spread), spread.T
         give_back()
-        xx, xy, yy = rows.inverse
-
-        def sweep(x, r, order):
-            for k in order:
-                own = rows.pattern.rows(k)
-                left = (r[own] - rows.times(x, k)).T
-                x.reshape(-1, 2)[own, 0] += xx[own] * left[0] + xy[own] * left[1]
-                x.reshape(-1, 2)[own, 1] += xy[own] * left[0] + yy[own] * left[1]
-
-        def precondition(r):
-            x, by_vertex = np.zeros(len(r)), r.reshape(-1, 2)
-            sweep(x, by_vertex, colours)
-            x += spread @ coarse.solve(gather @ (r - rows @ x))
-            sweep(x, by_vertex, reversed(colours))
-            return x
-
+        precondition = _preconditioner(rows, lambda r: spread @ coarse.solve(gather @ r))
         found = by_gradients(rows, b.reshape(-1, 2)[order].ravel(), precondition, MOST)
         if found is None:
             return None
@@ -80,20 +65,57 @@ class SymmetricSweeps:
         return x.ravel()
 
     def _coarse(self, rows: VertexRows, spread: sp.csr_matrix) -> Factor:
-        """Factors of the equations (6 parts, 6 parts) of the motions spread (2n, 6 parts), colour after colour."""
-        total = sp.csr_matrix((spread.shape[1],) * 2)
-        for k, both in enumerate(rows.of_colours):
-            own = rows.pattern.rows(k)
-            for p, some in enumerate(both):
-                found = spread[2 * own.start + p : 2 * own.stop : 2].T @ (some @ spread)
-                total = total + found
-        if rows.more_of_colours is not None:
-            total = total + spread.T @ (sp.vstack(rows.more_of_colours) @ spread)
-        total = total.tocsc()
+        """Factors of the equations (6 parts, 6 parts) of the motions spread (2n, 6 parts)."""
+        total = rows.between(spread).tocsc()
         if self._order is None:
             parts = minimum_degree(total[::6, ::6])
             self._order = (6 * parts[:, None] + np.arange(6)).ravel()
         return Factor(total + SHIFT * total.diagonal().max() * sp.identity(total.shape[0]), self._order)
+
+
+def _preconditioner(
+    rows: VertexRows, by_parts: Callable[[np.ndarray], np.ndarray]
+) -> Callable[[np.ndarray], np.ndarray]:
+    """A sweep, what parts make of what is left then, and the sweep back.
+
+    What earlier colours do to later ones is taken off what is left as they move, what later ones do to earlier ones on
+    the way back: either takes half of the matrix.
+    """
+    xx, xy, yy = rows.inverse
+    colours, more = range(len(rows.of_colours)), rows.more_of_colours is not None
+
+    def solve(x: np.ndarray, own: slice, left: np.ndarray) -> None:
+        """Move the vertices `own` to where nothing of what is left (v,2) of their rows is."""
+        u, v = left.T
+        x.reshape(-1, 2)[own, 0] = xx[own] * u + xy[own] * v
+        x.reshape(-1, 2)[own, 1] = xy[own] * u + yy[own] * v
+
+    def precondition(r: np.ndarray) -> np.ndarray:
+        x, left, beyond = np.zeros(len(r)), r.copy(), np.zeros(len(r))
+        for k in colours:
+            own = rows.pattern.rows(k)
+            here = left.reshape(-1, 2)[own]
+            if more:
+                beyond.reshape(-1, 2)[own] = rows.by_more(x, k)
+                here = here - beyond.reshape(-1, 2)[own]
+            solve(x, own, here)
+            rows.to_later(x, k, left)
+        for k in colours:
+            rows.from_later(x, k, beyond)
+            if more:
+                beyond.reshape(-1, 2)[rows.pattern.rows(k)] -= rows.by_more(x, k)
+        moved = by_parts(beyond)
+        x += moved
+        for k in colours:
+            rows.to_later(moved, k, left)
+        for k in reversed(colours):
+            own = rows.pattern.rows(k)
+            rows.from_later(x, k, left)
+            here = left.reshape(-1, 2)[own]
+            solve(x, own, here - rows.by_more(x, k) if more else here)
+        return x
+
+    return precondition
 
 
 def sweeping_solver(points: np.ndarray, triangles: np.ndarray) -> SymmetricSweeps | None:

@@ -1,8 +1,9 @@
 """Symmetric matrices of large meshes, two unknowns a vertex, by rows of vertices: colour after colour.
 
 No two vertices of a colour are neighbours, so that a sweep solves for all of them at once (Saad, Iterative methods for
-sparse linear systems, section 12.4), and their rows follow each other: nothing is copied for that. Both rows of a
-vertex share their columns, which halves what these take.
+sparse linear systems, section 12.4), and their rows follow each other: nothing is copied for that. Rows have the blocks
+with vertices of later colours alone, which is half of a symmetric matrix; the other half is their transpose. Both rows
+of a vertex share their columns, which halves what these take.
 """
 
 from __future__ import annotations
@@ -24,34 +25,69 @@ class RowPattern:
     """Where entries are in the rows of matrices of the cells (c_i,k_i), some triangles and some quads, of n vertices.
 
     order (n,) : vertices by colour, in which all else is numbered; first (colours + 1,) : where each begins
-    start (n + 1,), columns (2b,) : of the blocks of each vertex, and the two columns of each block
-    own (n,) : the block of each vertex with itself; blocks : (c_i,k_i^2) of the pairs of corners of cells, row by row
+    start (n + 1,) : the first of the b blocks of each vertex with those of later colours
+    columns (2b,) : the two columns of each block, counted from the first unknown of the next colour
+    blocks : (c_i, k_i (k_i + 1) / 2) of the pairs of corners of cells, see `corner_pairs`; b + v is that of vertex v
+        with itself, and ~k block k where the second corner comes before the first
     """
 
     def __init__(self, cells: Sequence[np.ndarray], n: int):
         key = _distinct_keys(cells, n)
-        row, column = (x.astype(np.int32) for x in np.divmod(key, n))
-        degree = np.bincount(row, minlength=n)
-        start = np.cumsum(degree) - degree
-        colour = coloured(start, row, column)
+        colour = _colours(key, n)
         self.order = np.argsort(colour, kind="stable").astype(np.int32)
         place = np.empty(n, np.int32)
         place[self.order] = np.arange(n)
         self.first = np.concatenate([[0], np.cumsum(np.bincount(colour))])
-        self.start = np.concatenate([[0], np.cumsum(degree[self.order])]).astype(np.int32)
-        moved = (self.start[place[row]] + (np.arange(len(key)) - start[row])).astype(np.int32)
-        self.columns = np.empty(2 * len(key), np.int32)
-        self.columns.reshape(-1, 2)[moved] = 2 * place[column][:, None] + np.arange(2)
-        self.own = moved[row == column][self.order]
-        self.blocks = [np.empty((len(c), c.shape[1] ** 2), np.int32) for c in cells]
+        sides = place[np.stack(np.divmod(key, n))]
+        row, column = sides.min(axis=0), sides.max(axis=0)
+        del sides
+        by_row = np.argsort(row.astype(np.int64) * n + column)
+        self.start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=n))]).astype(np.int32)
+        row, column = row[by_row], column[by_row]
+        later = column - self.first[1:].astype(np.int32)[colour[self.order[row]]]
+        self.columns = (2 * later[:, None] + np.arange(2, dtype=np.int32)).ravel()
+        del row, column, later
+        number = np.empty(len(key), np.int32)
+        number[by_row] = np.arange(len(key))
+        self.blocks = [np.empty((len(c), len(corner_pairs(c.shape[1])[0])), np.int32) for c in cells]
         for found, some in zip(self.blocks, cells, strict=True):
             for begin in range(0, len(some), AT_ONCE):
                 here = slice(begin, begin + AT_ONCE)
-                found[here] = moved[np.searchsorted(key, _keys(some[here], n))]
+                found[here] = self._blocks_of(some[here], key, number, place)
+
+    def _blocks_of(self, cells: np.ndarray, key: np.ndarray, number: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """The blocks of the pairs of corners of some cells (c,k); number : of the block of each key."""
+        one, other = (cells[:, side] for side in corner_pairs(cells.shape[1]))
+        # The key of a vertex with itself is none: what it comes to is of no use.
+        found = number[np.minimum(np.searchsorted(key, _keys(one, other, len(place))), len(key) - 1)] if len(key) else 0
+        found = np.where(place[one] > place[other], ~found, found)
+        return np.where(one == other, len(key) + place[one], found)
 
     def rows(self, colour: int) -> slice:
         """Which vertices have a colour."""
         return slice(int(self.first[colour]), int(self.first[colour + 1]))
+
+    @property
+    def count(self) -> int:
+        """Blocks b of two vertices."""
+        return len(self.columns) // 2
+
+
+def corner_pairs(k: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pairs of corners of a cell of k, each once, row by row."""
+    return np.triu_indices(k)
+
+
+def _colours(key: np.ndarray, n: int) -> np.ndarray:
+    """Colours (n,) of n vertices of which those of the keys are neighbours, see `_distinct_keys`."""
+    one, other = np.divmod(key, n)
+    both = np.concatenate([key, other * n + one, np.arange(n, dtype=np.int64) * (n + 1)])
+    del one, other
+    both.sort()
+    tail, head = (x.astype(np.int32) for x in np.divmod(both, n))
+    del both
+    degree = np.bincount(tail, minlength=n)
+    return coloured(np.cumsum(degree) - degree, tail, head)
 
 
 def coloured(start: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
@@ -82,7 +118,7 @@ def coloured(start: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarra
 class VertexRows:
     """A symmetric matrix (2n,2n) of a pattern; unknowns 2 i and 2 i + 1 are those of the vertex `pattern.order[i]`.
 
-    more : a sparse matrix (2n,2n) to be added, in the numbers of the mesh, or None
+    data : see `summed`; more : a sparse matrix (2n,2n) to be added, in the numbers of the mesh, or None
     """
 
     def __init__(self, pattern: RowPattern, data: np.ndarray, more: sp.spmatrix | None = None):
@@ -92,88 +128,126 @@ class VertexRows:
 
     @staticmethod
     def summed(pattern: RowPattern, parts: Iterable[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-        """The data (2,b,2) of a matrix: by axis of the row, block, and axis of the column.
+        """The data (2,b + n,2) of a matrix: by axis of the row, block, and axis of the column.
 
-        parts : the numbers (c,k^2) of some blocks in the pattern and their values (c,2k,2k)
+        parts : the blocks (c,p) of the pattern that belong to some cells, and what is added to these (c,2k,2k), symmetric
         """
-        data = np.zeros((2, len(pattern.columns) // 2, 2))
+        data = np.zeros((2, pattern.count + len(pattern.order), 2))
         seen, number = np.zeros(data.shape[1], bool), np.empty(data.shape[1], np.int32)
         for ids, blocks in parts:
-            flat, k = ids.ravel(), blocks.shape[1] // 2
+            k = blocks.shape[1] // 2
+            one, other = corner_pairs(k)
+            turned = ids < 0
+            flat = np.where(turned, ~ids, ids).ravel()
             seen[flat] = True
             touched = np.flatnonzero(seen)
             seen[touched] = False
             number[touched] = np.arange(len(touched))
             local = number[flat].astype(np.intp)
+            # Two corners may be one vertex, where others follow it.
+            alike = (ids >= pattern.count) & (one != other)
             cells = blocks.reshape(len(blocks), k, 2, k, 2)
             for p in range(2):
                 for q in range(2):
-                    data[p, touched, q] += np.bincount(local, cells[:, :, p, :, q].ravel(), len(touched))
+                    here, across = cells[:, one, p, other, q], cells[:, one, q, other, p]
+                    values = np.where(turned, across, here) + np.where(alike, across, 0)
+                    data[p, touched, q] += np.bincount(local, values.ravel(), len(touched))
         return data
 
     def add_diagonal(self, diagonal: np.ndarray) -> None:
         """Add a diagonal (2n,), in the numbers of the mesh."""
         for p, values in enumerate(diagonal.reshape(-1, 2)[self.pattern.order].T):
-            self._data[p, self.pattern.own, p] += values
+            self._data[p, self.pattern.count :, p] += values
 
     @cached_property
     def of_colours(self) -> list[tuple[sp.csr_matrix, sp.csr_matrix]]:
-        """The first and the second rows (v,2n) of the vertices of each colour."""
+        """The first and the second rows (v,2m) of the vertices of each colour, as far as they are of the m vertices of
+        later colours."""
         pattern, found = self.pattern, []
-        size = 2 * len(pattern.order)
         for k in range(len(pattern.first) - 1):
             own = pattern.rows(k)
             start = pattern.start[own.start : own.stop + 1]
             here, pointers = slice(2 * start[0], 2 * start[-1]), 2 * (start - start[0])
-            both = sp.csr_matrix((len(start) - 1, size)), sp.csr_matrix((len(start) - 1, size))
-            for rows, data in zip(both, self._data, strict=True):
-                # A matrix that is made of parts of larger arrays copies them.
-                rows.data, rows.indices, rows.indptr = data.reshape(-1)[here], pattern.columns[here], pointers
-            found.append(both)
+            size = len(start) - 1, 2 * (len(pattern.order) - own.stop)
+            first, second = (
+                _sharing(size, rows.reshape(-1)[here], pattern.columns[here], pointers) for rows in self._data
+            )
+            found.append((first, second))
         return found
 
     @cached_property
     def more_of_colours(self) -> list[sp.csr_matrix] | None:
-        """What is to be added to the rows (2v,2n) of each colour."""
+        """What is to be added to the rows (2v,2n) of each colour, beside `inverse`."""
         if self._more is None:
             return None
+        first, second = self._data[:, self.pattern.count :]
+        xx, xy, yy = self._own - np.stack([first[:, 0], first[:, 1], second[:, 1]])
+        size = np.arange(len(xx) + 1)
+        blocks = np.stack([np.stack([xx, xy], axis=1), np.stack([xy, yy], axis=1)], axis=1)
+        beside = (self._more - sp.bsr_matrix((blocks, size[:-1], size)).tocsr()).tocsr()
         cuts = 2 * self.pattern.first
-        return [self._more[a:b] for a, b in pairwise(cuts)]
+        return [beside[a:b] for a, b in pairwise(cuts)]
 
-    def times(self, x: np.ndarray, colour: int) -> np.ndarray:
-        """What the rows of a colour make of x (2n,): (v,2)."""
-        first, second = self.of_colours[colour]
-        found = np.column_stack([first @ x, second @ x])
-        return found if self.more_of_colours is None else found + (self.more_of_colours[colour] @ x).reshape(-1, 2)
+    def from_later(self, x: np.ndarray, colour: int, total: np.ndarray) -> None:
+        """Take what vertices of later colours, which are at x (2n,), do to those of a colour off a total (2n,)."""
+        own = total.reshape(-1, 2)[self.pattern.rows(colour)]
+        for axis, rows in enumerate(self.of_colours[colour]):
+            own[:, axis] -= rows @ x[len(x) - rows.shape[1] :]
+
+    def to_later(self, x: np.ndarray, colour: int, total: np.ndarray) -> None:
+        """Take what the vertices of a colour, which are at x (2n,), do to those of later colours off a total (2n,)."""
+        own = x.reshape(-1, 2)[self.pattern.rows(colour)]
+        first, second = (rows.T @ own[:, axis] for axis, rows in enumerate(self.of_colours[colour]))
+        first += second
+        total[len(total) - len(first) :] -= first
+
+    def by_more(self, x: np.ndarray, colour: int) -> np.ndarray:
+        """What `more_of_colours` makes of x (2n,), (v,2)."""
+        return (self.more_of_colours[colour] @ x).reshape(-1, 2)
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
-        return np.concatenate([self.times(x, k) for k in range(len(self.pattern.first) - 1)]).ravel()
+        found = np.empty(len(x))
+        at, minus = x.reshape(-1, 2), found.reshape(-1, 2)
+        for axis, rows in enumerate(self._data[:, self.pattern.count :]):
+            minus[:, axis] = -(rows[:, 0] * at[:, 0] + rows[:, 1] * at[:, 1])
+        for k in range(len(self.of_colours)):
+            self.from_later(x, k, found)
+            self.to_later(x, k, found)
+        if self._more is not None:
+            found -= self._more @ x
+        return np.negative(found, out=found)
 
     @cached_property
     def inverse(self) -> np.ndarray:
-        """Inverses of the blocks of vertices with themselves, (3,n): entries of both diagonals. Raises PrecisionError.
-
-        What is added to the pattern may join vertices of a colour: their blocks are as much greater as makes sweeps
-        converge all the same (Baker, Falgout, Kolev, Yang 2011).
-        """
-        first, second = (self._data[p, self.pattern.own] for p in range(2))
-        xx, xy, yy = first[:, 0].copy(), first[:, 1].copy(), second[:, 1].copy()
-        if self._more is not None:
-            more = self._more.tocoo()
-            row, column = more.row // 2, more.col // 2
-            axes = more.row % 2 + more.col % 2
-            for k, entry in enumerate((xx, xy, yy)):
-                # Entries below the diagonal of a block are those above it.
-                here = (row == column) & (axes == k) & (more.row <= more.col)
-                entry += np.bincount(row[here], more.data[here], len(entry))
-            colour = np.searchsorted(self.pattern.first, np.arange(len(xx)), side="right")
-            beside = (row != column) & (colour[row] == colour[column])
-            lift = np.bincount(more.row[beside], np.abs(more.data[beside]), 2 * len(xx))
-            xx, yy = xx + lift[::2], yy + lift[1::2]
+        """Inverses of the blocks of vertices with themselves, (3,n): entries of both diagonals. Raises PrecisionError."""
+        xx, xy, yy = self._own
         det = xx * yy - xy * xy
         if not (det > 0).all():
             raise PrecisionError("A linear system is singular in double precision")
         return np.stack([yy / det, -xy / det, xx / det])
+
+    @property
+    def _own(self) -> np.ndarray:
+        """The blocks of vertices with themselves, (3,n) as in `inverse`.
+
+        What is added to the pattern may join vertices of a colour: their blocks are as much greater as makes sweeps
+        converge all the same (Baker, Falgout, Kolev, Yang 2011).
+        """
+        first, second = self._data[:, self.pattern.count :]
+        xx, xy, yy = first[:, 0].copy(), first[:, 1].copy(), second[:, 1].copy()
+        if self._more is None:
+            return np.stack([xx, xy, yy])
+        more = self._more.tocoo()
+        row, column = more.row // 2, more.col // 2
+        axes = more.row % 2 + more.col % 2
+        for k, entry in enumerate((xx, xy, yy)):
+            # Entries below the diagonal of a block are those above it.
+            here = (row == column) & (axes == k) & (more.row <= more.col)
+            entry += np.bincount(row[here], more.data[here], len(entry))
+        colour = np.searchsorted(self.pattern.first, np.arange(len(xx)), side="right")
+        beside = (row != column) & (colour[row] == colour[column])
+        lift = np.bincount(more.row[beside], np.abs(more.data[beside]), 2 * len(xx))
+        return np.stack([xx + lift[::2], xy, yy + lift[1::2]])
 
     def shifted(self, shift: float) -> VertexRows:
         """The matrix and a multiple of the identity."""
@@ -182,14 +256,53 @@ class VertexRows:
         found.add_diagonal(np.full(2 * len(self.pattern.order), shift))
         return found
 
+    def between(self, motions: sp.csr_matrix) -> sp.csr_matrix:
+        """What the matrix makes of every two of some motions, (2n,k) in the numbers of its rows: (k,k)."""
+        total = sp.csr_matrix((motions.shape[1],) * 2)
+        for k, both in enumerate(self.of_colours):
+            own = self.pattern.rows(k)
+            later = _from(motions, 2 * own.stop)
+            itself = self._data[:, self.pattern.count :][:, own]
+            for axis, rows in enumerate(both):
+                some = motions[2 * own.start + axis : 2 * own.stop : 2].T
+                half = some @ (rows @ later)
+                total = total + half + half.T
+                for other, entries in enumerate(itself[axis].T):
+                    moved = motions[2 * own.start + other : 2 * own.stop : 2]
+                    moved.data *= np.repeat(entries, np.diff(moved.indptr))
+                    total = total + some @ moved
+        return total if self._more is None else total + motions.T @ (self._more @ motions)
+
     def plain(self) -> sp.csc_matrix:
         """The matrix, in the numbers of the mesh."""
-        rows = sp.vstack([sp.vstack(both).tocsr()[_alternating(both[0].shape[0])] for both in self.of_colours])
+        pattern, n = self.pattern, len(self.pattern.order)
+        upper = []
+        for k, both in enumerate(self.of_colours):
+            own = pattern.rows(k)
+            shifted = [sp.csr_matrix((x.data, x.indices + 2 * own.stop, x.indptr), (x.shape[0], 2 * n)) for x in both]
+            upper.append(sp.vstack(shifted).tocsr()[_alternating(own.stop - own.start)])
+        half = sp.vstack(upper).tocsr()
+        own = self._data[:, pattern.count :].transpose(1, 0, 2)
+        rows = half + half.T + sp.bsr_matrix((own, np.arange(n), np.arange(n + 1))).tocsr()
         rows = rows.tocsr() if self._more is None else rows.tocsr() + self._more
-        place = np.empty(len(self.pattern.order), np.int64)
-        place[self.pattern.order] = np.arange(len(place))
+        place = np.empty(n, np.int64)
+        place[pattern.order] = np.arange(n)
         unknowns = (2 * place[:, None] + np.arange(2)).ravel()
         return rows[unknowns][:, unknowns].tocsc()
+
+
+def _sharing(shape: tuple[int, int], data: np.ndarray, indices: np.ndarray, start: np.ndarray) -> sp.csr_matrix:
+    """A sparse matrix whose entries are parts of larger arrays, not copies of these, which it would make of itself."""
+    found = sp.csr_matrix(shape)
+    found.data, found.indices, found.indptr = data, indices, start
+    return found
+
+
+def _from(rows: sp.csr_matrix, first: int) -> sp.csr_matrix:
+    """The rows of a matrix from the first of some on, which are not copied."""
+    start = rows.indptr[first:]
+    here = slice(start[0], start[-1])
+    return _sharing((len(start) - 1, rows.shape[1]), rows.data[here], rows.indices[here], start - start[0])
 
 
 def _alternating(count: int) -> np.ndarray:
@@ -197,23 +310,24 @@ def _alternating(count: int) -> np.ndarray:
     return (np.arange(count)[:, None] + [0, count]).ravel()
 
 
-def _keys(cells: np.ndarray, n: int) -> np.ndarray:
-    """Keys (c,k^2) of the pairs of corners of cells (c,k), row by row."""
-    k = cells.shape[1]
-    return np.repeat(cells, k, axis=1).astype(np.int64) * n + np.tile(cells, (1, k))
+def _keys(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
+    """Keys of pairs of vertices, whichever of both comes first."""
+    return np.minimum(one, other).astype(np.int64) * n + np.maximum(one, other)
 
 
 def _distinct_keys(cells: Sequence[np.ndarray], n: int) -> np.ndarray:
-    """The keys of all pairs of corners, and of all vertices with themselves, in order, each once: a vertex may follow
-    another, and be in no cell."""
-    key = np.empty(n + sum(len(c) * c.shape[1] ** 2 for c in cells), np.int64)
-    key[:n] = np.arange(n, dtype=np.int64) * (n + 1)
-    begin = n
+    """The keys of all pairs of different corners, in order, each once."""
+    key = np.empty(sum(len(c) * c.shape[1] * (c.shape[1] - 1) // 2 for c in cells), np.int64)
+    begin = 0
     for some in cells:
+        one, other = np.triu_indices(some.shape[1], 1)
         for part in (some[k : k + AT_ONCE] for k in range(0, len(some), AT_ONCE)):
-            found = _keys(part, n).ravel()
+            # Where vertices follow others, two corners may be one.
+            found = np.where(part[:, one] == part[:, other], -1, _keys(part[:, one], part[:, other], n)).ravel()
             key[begin : begin + len(found)] = found
             begin += len(found)
     key.sort()
-    kept = np.concatenate([[True], key[1:] != key[:-1]])
+    key = key[np.searchsorted(key, 0) :]
+    kept = np.ones(len(key), bool)
+    kept[1:] = key[1:] != key[:-1]
     return key[kept]
