@@ -124,19 +124,24 @@ def gradient_steps(
     Each is x (n,), the residual b - A x (n,), and how far x.A.x / 2 - b.x has fallen, times two; x and the residual are
     overwritten by the next. Ends where the residual leads nowhere any more, to the precision of the preconditioner.
     """
-    x, residual = np.zeros(len(b)), b.copy()
-    direction, power, fallen = 0.0, 1.0, 0.0
+    x, residual, direction = np.zeros(len(b)), b.copy(), np.zeros(len(b))
+    power, fallen = 1.0, 0.0
     while True:
         yield x, residual, fallen
         z = precondition(residual)
         power, before = residual @ z, power
         if power <= 0:
             return
-        direction = z + (power / before) * direction
+        direction *= power / before
+        direction += z
+        del z
         image = A @ direction
         step = power / (direction @ image)
         x += step * direction
-        residual -= step * image
+        image *= step
+        residual -= image
+        # Of large meshes it takes the memory of a map.
+        del image
         fallen += step * power
 
 

@@ -56,7 +56,7 @@ class SymmetricSweeps:
         give_back()
         coarse, gather = self._coarse(rows, spread), spread.T
         give_back()
-        precondition = _preconditioner(rows, lambda r: spread @ coarse.solve(gather @ r))
+        precondition = _preconditioner(rows, lambda r: coarse.solve(gather @ r), spread)
         found = by_gradients(rows, b.reshape(-1, 2)[order].ravel(), precondition, MOST)
         if found is None:
             return None
@@ -74,9 +74,9 @@ class SymmetricSweeps:
 
 
 def _preconditioner(
-    rows: VertexRows, by_parts: Callable[[np.ndarray], np.ndarray]
+    rows: VertexRows, by_parts: Callable[[np.ndarray], np.ndarray], spread: sp.csr_matrix
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A sweep, what parts make of what is left then, and the sweep back.
+    """A sweep, what parts make of what is left then, as motions to be spread (2n,k), and the sweep back.
 
     What earlier colours do to later ones is taken off what is left as they move, what later ones do to earlier ones on
     the way back: either takes half of the matrix.
@@ -104,10 +104,13 @@ def _preconditioner(
             rows.from_later(x, k, beyond)
             if more:
                 beyond.reshape(-1, 2)[rows.pattern.rows(k)] -= rows.by_more(x, k)
-        moved = by_parts(beyond)
+        motions = by_parts(beyond)
+        del beyond
+        moved = spread @ motions
         x += moved
         for k in colours:
             rows.to_later(moved, k, left)
+        del moved
         for k in reversed(colours):
             own = rows.pattern.rows(k)
             rows.from_later(x, k, left)

@@ -130,7 +130,7 @@ class VertexRows:
     def summed(pattern: RowPattern, parts: Iterable[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
         """The data (2,b + n,2) of a matrix: by axis of the row, block, and axis of the column.
 
-        parts : the blocks (c,p) of the pattern that belong to some cells, and what is added to these (c,2k,2k), symmetric
+        parts : the blocks (c,p) of the pattern that belong to some cells, and what these cells add, (c,2k,2k) symmetric
         """
         data = np.zeros((2, pattern.count + len(pattern.order), 2))
         seen, number = np.zeros(data.shape[1], bool), np.empty(data.shape[1], np.int32)
@@ -219,7 +219,7 @@ class VertexRows:
 
     @cached_property
     def inverse(self) -> np.ndarray:
-        """Inverses of the blocks of vertices with themselves, (3,n): entries of both diagonals. Raises PrecisionError."""
+        """Inverses of the blocks of vertices with themselves, (3,n): entries xx, xy, yy. Raises PrecisionError."""
         xx, xy, yy = self._own
         det = xx * yy - xy * xy
         if not (det > 0).all():

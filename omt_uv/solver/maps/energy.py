@@ -16,6 +16,7 @@ of several triangles adds the square of its area's slope (Gauss-Newton), one row
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,17 +71,30 @@ class Elements:
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dw/dz and dw/dconj(z) per triangle, (m,) complex each, of a map w (n,) complex."""
         a, b = (np.empty(len(self.triangles), complex) for _ in range(2))
-        for begin in range(0, len(a), AT_ONCE):
-            here = slice(begin, begin + AT_ONCE)
-            corner, g = 0.5 * w[self.triangles[here]], self.gradient[here]
-            a[here] = np.einsum("mi,mi->m", corner, g.conj())
-            b[here] = np.einsum("mi,mi->m", corner, g)
+        for here in self.some_at_once():
+            a[here], b[here] = self.derivatives_at(w, here)
         return a, b
+
+    def derivatives_at(self, w: np.ndarray, here: slice) -> tuple[np.ndarray, np.ndarray]:
+        """`derivatives` of some triangles (k,)."""
+        corner, g = 0.5 * w[self.triangles[here]], self.gradient[here]
+        return np.einsum("mi,mi->m", corner, g.conj()), np.einsum("mi,mi->m", corner, g)
+
+    def some_at_once(self) -> Iterator[slice]:
+        """Triangles some after the others: what is found of all on the way takes more memory than the mesh."""
+        return (slice(begin, begin + AT_ONCE) for begin in range(0, len(self.triangles), AT_ONCE))
+
+    def determinants(self, w: np.ndarray) -> np.ndarray:
+        """Of the Jacobian of every triangle, (m,), of a map w (n,) complex."""
+        det = np.empty(len(self.triangles))
+        for here in self.some_at_once():
+            a, b = self.derivatives_at(w, here)
+            det[here] = squared(a) - squared(b)
+        return det
 
     def areas(self, w: np.ndarray) -> np.ndarray:
         """Signed UV area of every polygon, (p,), over the area of the surface."""
-        a, b = self.derivatives(w)
-        return self.area * self.sums(squared(a) - squared(b))
+        return self.area * self.sums(self.determinants(w))
 
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Values of triangles (m,) summed by their parts of the polygons, (p,)."""
@@ -172,8 +186,7 @@ def energies_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: floa
 
 def has_folds(faces: Elements, w: np.ndarray) -> bool:
     """Whether a triangle that counts is folded in a map w (n,) complex, or has no area."""
-    a, b = faces.derivatives(w)
-    return bool(faces.folded(squared(a) - squared(b)).any())
+    return bool(faces.folded(faces.determinants(w)).any())
 
 
 def gradient(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mesh.geometry import face_areas, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
-from .energy import Elements, Quads, elements, hat_gradients
+from .energy import AT_ONCE, Elements, Quads, elements, energies, energy, hat_gradients
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
 MOST_TRIANGLES = 8
@@ -217,6 +217,19 @@ def in_turn(faces: Elements, count: int) -> Iterator[tuple[Elements, slice, np.n
         end = min(begin + count, four)
         here = slice(single + begin, single + end)
         yield _slice_of(faces, here, slice(first + 4 * begin, first + 4 * end)), here, none, slice(begin, end)
+
+
+def energy_in_turn(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> float:
+    """`energy.energy`, to the bit, of some polygons after the others: all at once take more memory than the mesh.
+
+    area_weight : one, or (p,) of the polygons
+    """
+    if len(faces.triangles) <= 4 * AT_ONCE:
+        return energy(faces, w, area_weight)
+    value = np.empty(len(faces.area))
+    for some, here, _, _ in in_turn(faces, AT_ONCE):
+        value[here] = energies(some, w, area_weight if np.ndim(area_weight) == 0 else area_weight[here])
+    return float(value.sum())
 
 
 def _slice_of(faces: Elements, here: slice, rows: slice) -> Elements:

@@ -14,9 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from ..maps.contacts import crossings
-from ..maps.energy import Elements, energies, missing_tilt, target_error, target_error_but_share, tilted
+from ..maps.energy import Elements, missing_tilt, target_error, target_error_but_share, tilted
 from ..maps.mirror_symmetry import MirrorSymmetry
-from ..maps.polygon_elements import with_convex_quads
+from ..maps.polygon_elements import energy_in_turn, with_convex_quads
 from ..progress import Progress, Steps
 from .boundary_barrier import BoundaryBarrier, make_barrier
 from .continuation_rules import (
@@ -258,7 +258,7 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
 
 
 def _shear_of(faces: Elements) -> Callable[[np.ndarray], float]:
-    return lambda w: float(energies(faces, w, 0.0).sum())
+    return lambda w: energy_in_turn(faces, w, 0.0)
 
 
 @dataclass(frozen=True)

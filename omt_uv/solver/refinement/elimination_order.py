@@ -63,7 +63,8 @@ def renumbered(
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     joined = triangles if polygons is None else polygon_mesh(triangles, polygons).every_triangle()
     order = mesh_order(vertices, joined)
-    place = np.empty(len(order), np.int64)
+    # What is kept of the mesh takes half of the memory that it came in.
+    place = np.empty(len(order), np.int32)
     place[order] = np.arange(len(order))
     renumbered_pins = None
     if pins is not None and len(pins[0]):

@@ -14,8 +14,9 @@ import scipy.sparse as sp
 from ..errors import PrecisionError
 from ..linalg.sparse import FillOrder
 from ..linalg.vertex_rows import VertexRows
-from ..maps.energy import Elements, energies, squared, target_error
+from ..maps.energy import Elements, squared, target_error
 from ..maps.mirror_symmetry import MirrorSymmetry
+from ..maps.polygon_elements import energy_in_turn
 from .hessian_blocks import Assembly, Matrix, RowAssembly, Solver
 from .vertex_sweeps import Smoother
 
@@ -155,7 +156,7 @@ class NewtonProblem:
 
     def energy(self, w: np.ndarray) -> float:
         """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""
-        value = float(energies(self.faces, w, self.area_weight).sum())
+        value = energy_in_turn(self.faces, w, self.area_weight)
         return value + sum(e.energy(w) for e in self.terms) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
@@ -258,8 +259,11 @@ def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: f
 
 def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
     """The smallest t > 0 at which a face of w + t step has no area; infinity if there is none."""
-    far = fold_shares(*faces.derivatives(w), *faces.derivatives(step))
-    return float((far if faces.part is None else far[faces.part > 0]).min(initial=np.inf))
+    first = np.inf
+    for here in faces.some_at_once():
+        far = fold_shares(*faces.derivatives_at(w, here), *faces.derivatives_at(step, here))
+        first = (far if faces.part is None else far[faces.part[here] > 0]).min(initial=first)
+    return float(first)
 
 
 def fold_shares(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.ndarray:

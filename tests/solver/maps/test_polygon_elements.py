@@ -1,14 +1,18 @@
 """Elements of polygons: their areas are those that the figures count, whichever diagonal cuts them."""
 
+import meshes
 import numpy as np
 import polygons
 import pytest
 
+from omt_uv.solver.maps import energy as energy_module
+from omt_uv.solver.maps import polygon_elements as elements_module
 from omt_uv.solver.maps.distortion import distortion
-from omt_uv.solver.maps.energy import area_error
-from omt_uv.solver.maps.polygon_elements import polygon_elements
+from omt_uv.solver.maps.energy import area_error, energies, has_folds
+from omt_uv.solver.maps.polygon_elements import energy_in_turn, polygon_elements
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.polygon_areas import polygon_areas
+from omt_uv.solver.refinement.projected_newton import first_fold
 
 
 @pytest.mark.parametrize("scene", [polygons.wavy_quads, polygons.wavy_mixed])
@@ -32,3 +36,33 @@ def test_triangles_of_a_long_polygon_ask_for_its_area_together():
         asked = found.area * found.ratio
         own = polygon_areas(V, F, owner)
         assert np.sort(asked / asked.sum()) == pytest.approx(np.sort(own / own.sum()), rel=1e-12)
+
+
+@pytest.mark.parametrize("scene", [polygons.wavy_quads, polygons.wavy_mixed, None])
+@pytest.mark.parametrize("many", [False, True])
+def test_some_polygons_after_the_others_are_to_the_bit_what_all_at_once_are(scene, many, monkeypatch):
+    """Large meshes are measured so, in less memory."""
+    if scene is None:
+        V, F = meshes.bumpy(9, 7)
+        w, owner = V[:, :2] @ [1, 1j], None
+    else:
+        V, faces, uv = scene()
+        (F, owner), w = polygons.cut(faces, 0), uv @ [1, 1j]
+    faces = polygon_elements(V, F, face_areas(V, F), owner)
+    rng = np.random.default_rng(0)
+    step = rng.normal(size=(len(w), 2)) @ [1, 1j]
+    weight = rng.random(len(faces.area)) if many else 30.0
+
+    def found():
+        plain = energy_in_turn(faces, w, weight), energy_in_turn(faces, w + step, weight), first_fold(faces, w, step)
+        return plain, faces.areas(w).tolist(), has_folds(faces, w), has_folds(faces, w + step)
+
+    assert energy_in_turn(faces, w, weight) == energies(faces, w, weight).sum()
+    whole = found()
+    assert np.isfinite(whole[0][0]) and whole[0][1] == np.inf and 0 < whole[0][2] < 1 and whole[2:] == (False, True)
+    for module in (energy_module, elements_module):
+        monkeypatch.setattr(module, "AT_ONCE", 7)
+    assert found() == whole
+    # A step short of the first fold folds nothing, one beyond it does.
+    far = whole[0][2]
+    assert [has_folds(faces, w + share * far * step) for share in (0.999, 1.001)] == [False, True]
