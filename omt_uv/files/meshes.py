@@ -91,8 +91,8 @@ def last_line(text: str) -> str:
 
 
 def _read_blend(path: str) -> None:
-    """Open a .blend file, in Object Mode."""
-    bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
+    """Open a .blend file, in Object Mode, with its windows: what is not open is not saved again."""
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=True, use_scripts=False)
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 

@@ -159,6 +159,28 @@ def test_a_rigged_scene_keeps_all_but_its_uvs(package, run, tmp_path, suffix):
         assert (tmp_path / "out.blend").read_bytes()[:4] == magic
 
 
+def test_workspaces_and_editors_of_a_blend_stay(run, tmp_path):
+    """They were replaced by those of a new file: an artist's windows were gone after a run over the only copy."""
+    bpy.ops.wm.read_factory_settings(use_empty=False)
+    first = bpy.data.workspaces[0].name
+    bpy.data.workspaces[first].name = "Mine \u00e4\u00f6"
+    bpy.data.workspaces["UV Editing"]["note"] = "kept"
+    views = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
+    for view in views:
+        if view.type == "VIEW_3D":
+            view.lens = 77
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "in.blend", "--quality", "draft")[0] == 0
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "in.blend"), load_ui=True)
+    names = {workspace.name for workspace in bpy.data.workspaces}
+    assert "Mine \u00e4\u00f6" in names and first not in names
+    assert bpy.data.workspaces["UV Editing"]["note"] == "kept"
+    views = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
+    assert {round(view.lens) for view in views if view.type == "VIEW_3D"} == {77}
+
+
 @pytest.mark.parametrize("target", [".glb", ".gltf", ".fbx"])
 def test_all_that_a_format_holds_goes_along(package, run, tmp_path, target):
     """D3: rigs and shading got lost from .blend to glTF and FBX."""
