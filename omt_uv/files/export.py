@@ -16,6 +16,8 @@ from .meshes import AXES
 from .obj_precision import restore_precision
 
 Objects = Sequence[bpy.types.Object]
+# Types of attributes that are colours.
+COLOURS = {"FLOAT_COLOR", "BYTE_COLOR"}
 
 
 def export(path: Path, suffix: str, objects: Objects, everything: bool) -> list[str]:
@@ -81,6 +83,7 @@ def _write_ply(path: Path, objects: Objects, everything: bool) -> list[str]:
         bpy.context.scene.collection.objects.link(copy)
         _cut_uv_seams(copy.data)
         cut.append(copy)
+    told = _with_like_attributes([copy.data for copy in cut])
     _select_only(cut)
     try:
         bpy.ops.wm.ply_export(
@@ -94,8 +97,39 @@ def _write_ply(path: Path, objects: Objects, everything: bool) -> list[str]:
         )
     finally:
         for copy in cut:
-            bpy.data.meshes.remove(copy.data)
-    return []
+            # With its mesh alone, the view layer would go on to hold an object that is gone.
+            mesh = copy.data
+            bpy.data.objects.remove(copy)
+            bpy.data.meshes.remove(mesh)
+    return told
+
+
+def _with_like_attributes(meshes: Sequence[bpy.types.Mesh]) -> list[str]:
+    """Give all meshes the vertex attributes that any has, 0 where it had none, or none of them: the exporter writes
+    those that some lack to other vertices, and beyond the end of its memory. Warnings name what is left out."""
+    kinds: dict[str, set[str]] = {}
+    for mesh in meshes:
+        active = mesh.color_attributes.active_color
+        for found in mesh.attributes:
+            written = found.domain == "POINT" and found.name != "position" and not found.name.startswith(".")
+            if written and (active is None or found.name != active.name):
+                kinds.setdefault(found.name, set()).add(found.data_type)
+    left = []
+    for name, types in kinds.items():
+        there = [mesh for mesh in meshes if name in mesh.attributes]
+        # One that is new may become the colour that is shown.
+        alike = (
+            len(types) == 1 and not types & COLOURS and all(mesh.attributes[name].domain == "POINT" for mesh in there)
+        )
+        if len(there) < len(meshes) and alike:
+            for mesh in meshes:
+                if mesh not in there:
+                    mesh.attributes.new(name, *types, "POINT")
+        elif len(there) < len(meshes) or len(types) > 1:
+            left.append(name)
+            for mesh in there:
+                mesh.attributes.remove(mesh.attributes[name])
+    return [f"Not every object has a vertex attribute of one kind named {name}; it was left out" for name in left]
 
 
 def _cut_uv_seams(mesh: bpy.types.Mesh) -> None:

@@ -80,7 +80,9 @@ def save_uvs(path: Path, objects: Objects, source: Path) -> list[str]:
             with staged(path) as made:
                 made.write_bytes(new)
                 check_bytes(made, new)
-            return [*warnings, *_left_behind(new, suffix, source, path)]
+            from .losses import losses_in_place
+
+            return [*warnings, *losses_in_place(suffix, objects), *_left_behind(new, suffix, source, path)]
     return [*told, *_save_anew(path, objects, everything=True, source=source)]
 
 

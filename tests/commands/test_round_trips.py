@@ -188,7 +188,8 @@ def test_all_that_a_format_holds_goes_along(package, run, tmp_path, target):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     status, _, err = run("unwrap", tmp_path / "in.blend", "-o", tmp_path / f"out{target}", "--quality", "draft")
     assert status == 0
-    assert "left out" not in err
+    # The box and its twin are cut along seams by hand.
+    assert [line.split("left out: ")[1] for line in err.splitlines() if "left out" in line] == ["seams (2)"]
     found, _ = opened(package, tmp_path / f"out{target}")
     assert {"Rig", "Body", "Box", "Twin", "Place", "Lamp", "Eye"} <= set(found)
     assert set(found["Rig"]["bones"]) == {"low", "high"}
@@ -219,6 +220,25 @@ def test_what_a_format_does_not_hold_is_named(run, tmp_path, target):
     ):
         assert word in line
     assert ("materials" in line) == (target != ".obj")
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb"])
+def test_a_new_uv_map_and_seams_that_a_file_does_not_hold_are_named(run, tmp_path, suffix):
+    """A second UV map took the place of the only one of an .obj or .ply, and marks of seams went nowhere, unsaid."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8)
+    bpy.ops.object.select_all(action="SELECT")
+    path = tmp_path / f"in{suffix}"
+    if suffix == ".glb":
+        bpy.ops.export_scene.gltf(filepath=str(path))
+    else:
+        getattr(bpy.ops.wm, f"{suffix[1:]}_export")(filepath=str(path))
+    words = ("unwrap", path, "-o", tmp_path / f"out{suffix}", "--quality", "draft")
+    assert "left out" not in run(*words)[2]
+    status, _, err = run(*words, "--mark-seams", "--uv-layer", "New")
+    assert status == 0
+    (line,) = [line for line in err.splitlines() if "left out: " in line]
+    assert "seams (1)" in line
+    assert ("UV maps beside the one written (1)" in line) == (suffix != ".glb")
 
 
 def write_rich_obj(folder):

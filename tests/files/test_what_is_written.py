@@ -69,6 +69,75 @@ def test_modifiers_are_lost_but_those_of_rigs(package, suffix):
         assert "modifiers (1)" in named(), count
 
 
+def layered():
+    """A patch with two UV maps, two colours, attributes of vertices and of faces, a seam and a crease."""
+    obj = patch("Layered")
+    mesh = obj.data
+    mesh.uv_layers.new(name="Second")
+    for name in ("One", "Two"):
+        mesh.color_attributes.new(name, "FLOAT_COLOR", "CORNER")
+    mesh.color_attributes.active_color = mesh.color_attributes["Two"]
+    mesh.attributes.new("of_vertices", "FLOAT", "POINT")
+    mesh.attributes.new("of_faces", "INT", "FACE")
+    mesh.edges[2].use_seam = True
+    mesh.attributes.new("crease_edge", "FLOAT", "EDGE").data[2].value = 0.5
+    return obj
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_layers_and_marks_that_a_format_does_not_hold_are_named(package, tmp_path, suffix):
+    """They were lost without a word: what is named is what is not there when the file is read again."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = layered()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    obj = bpy.data.objects["Layered"]
+    told = " ".join(package("files.saving").save_uvs(tmp_path / f"out{suffix}", [obj], tmp_path / "in.blend"))
+    (again,) = package("files.meshes").load(tmp_path / f"out{suffix}")
+    mesh = again.data
+    there = {
+        "UV maps beside the one written": len(mesh.uv_layers) > 1,
+        "colours beside the active ones": len(mesh.color_attributes) > 1,
+        "attributes": {"of_vertices", "of_faces"} <= set(mesh.attributes.keys()),
+        "seams": any(edge.use_seam for edge in mesh.edges),
+        "creases": "crease_edge" in mesh.attributes,
+    }
+    assert {kind: f"{kind} (1)" in told for kind in there} == {kind: not found for kind, found in there.items()}
+    # An object that has none of them loses none.
+    bare = package("files.losses").losses(suffix, [patch("Bare")])
+    assert not any(f"{kind} (" in line for kind in there for line in bare)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb", ".fbx"])
+def test_objects_that_a_format_does_not_hold_are_named(package, tmp_path, suffix):
+    """Whatever is no mesh: curves and all else were left out of .obj and .ply without a word."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = patch("Patch")
+    made = {
+        "CURVE": bpy.data.curves.new("Curve", "CURVE"),
+        "FONT": bpy.data.curves.new("Text", "FONT"),
+        "META": bpy.data.metaballs.new("Meta"),
+        "LATTICE": bpy.data.lattices.new("Lattice"),
+        "SPEAKER": bpy.data.speakers.new("Speaker"),
+        "VOLUME": bpy.data.volumes.new("Volume"),
+    }
+    made["CURVE"].bevel_depth = 0.1
+    line = made["CURVE"].splines.new("POLY")
+    line.points.add(1)
+    line.points[1].co = (1, 0, 0, 1)
+    made["FONT"].body = "A"
+    made["META"].elements.new()
+    for name, data in made.items():
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, data))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    told = " ".join(package("files.saving").save_uvs(tmp_path / f"out{suffix}", [obj], tmp_path / "in.blend"))
+    package("files.meshes").load(tmp_path / f"out{suffix}")
+    shapes = {obj.name.split(".")[0] for obj in bpy.data.objects if obj.type == "MESH"}
+    assert ("curves and texts (2)" in told) == (not {"CURVE", "FONT"} <= shapes)
+    assert ("metaballs (1)" in told) == ("META" not in shapes)
+    for word in ("lattices (1)", "speakers (1)", "volumes (1)"):
+        assert word in told
+
+
 @pytest.mark.parametrize("which", ["first", "second", "both"])
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb"])
 def test_colours_of_any_object_go_along(package, tmp_path, suffix, which):
@@ -88,6 +157,50 @@ def test_colours_of_any_object_go_along(package, tmp_path, suffix, which):
                if mesh.color_attributes]  # fmt: skip
     red = sum(int(((c[:, 0] > 0.9) & (c[:, 1] < 0.1)).sum() > 0) for c in colours)
     assert red >= 1
+
+
+@pytest.mark.parametrize("has", [(1, 0, 1), (0, 1, 0), (1, 0, 0), (0, 0, 1), (1, 1, 1)])
+def test_vertices_of_a_ply_keep_their_own_values_where_objects_lack_some(package, tmp_path, has):
+    """Blender's exporter gave those of one object to the vertices of another, and wrote beyond its memory."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    objects, expected, places = [], [], []
+    for k, there in enumerate(has):
+        obj = patch(f"Patch {k}")
+        for vertex in obj.data.vertices:
+            vertex.co.x += 10 * k
+        values = 100 * k + np.arange(len(obj.data.vertices)) + 1.0
+        if there:
+            obj.data.attributes.new("heat", "FLOAT", "POINT").data.foreach_set("value", values)
+        else:
+            # Their UVs are attributes of vertices on the way, too.
+            obj.data.uv_layers.remove(obj.data.uv_layers[0])
+        objects.append(obj)
+        expected += list(values * there)
+        places += [tuple(vertex.co) for vertex in obj.data.vertices]
+    path = tmp_path / "made.ply"
+    assert package("files.export").export(path, ".ply", objects, False) == []
+    assert all(("heat" in obj.data.attributes) == bool(there) for obj, there in zip(objects, has, strict=True))
+    (obj,) = package("files.meshes").load(path)
+    np.testing.assert_allclose([tuple(v.co) for v in obj.data.vertices][: len(places)], places, atol=1e-6)
+    found = np.zeros(len(obj.data.vertices), np.float32)
+    obj.data.attributes["heat"].data.foreach_get("value", found)
+    assert found[: len(expected)].tolist() == expected
+
+
+def test_attributes_of_several_kinds_and_colours_that_some_lack_are_left_out_of_a_ply_by_name(package, tmp_path):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    objects = [patch(f"Patch {k}") for k in range(3)]
+    for k, obj in enumerate(objects):
+        obj.data.attributes.new("kind", ("FLOAT", "INT", "FLOAT")[k], "POINT")
+        for name in ("Shown", "Other") if k != 1 else ("Shown",):
+            obj.data.color_attributes.new(name, "FLOAT_COLOR", "POINT")
+        obj.data.color_attributes.active_color = obj.data.color_attributes["Shown"]
+    told = package("files.export").export(tmp_path / "made.ply", ".ply", objects, False)
+    assert sorted(line.split(" named ")[1].split(";")[0] for line in told) == ["Other", "kind"]
+    assert all("kind" in obj.data.attributes for obj in objects)
+    (obj,) = package("files.meshes").load(tmp_path / "made.ply")
+    assert not any(name.startswith(("kind", "Other")) for name in set(obj.data.attributes.keys()))
+    assert len(obj.data.color_attributes) == 1
 
 
 KINDS_OF_ALPHA = list(product((False, True), ("STRAIGHT", "PREMUL", "CHANNEL_PACKED", "NONE")))
