@@ -97,10 +97,9 @@ def _write_ply(path: Path, objects: Objects, everything: bool) -> list[str]:
         )
     finally:
         for copy in cut:
-            # With its mesh alone, the view layer would go on to hold an object that is gone.
-            mesh = copy.data
-            bpy.data.objects.remove(copy)
-            bpy.data.meshes.remove(mesh)
+            bpy.data.meshes.remove(copy.data)
+        # Until then the view layer holds objects that are gone.
+        bpy.context.view_layer.update()
     return told
 
 

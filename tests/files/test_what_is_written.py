@@ -268,3 +268,15 @@ def test_a_blend_holds_every_mesh_bit_by_bit_or_is_refused_by_the_name_of_the_on
         check(path, [one])
     # What was linked for a look is gone.
     assert len(bpy.data.libraries) == libraries and not any(mesh.library for mesh in bpy.data.meshes)
+
+
+def test_several_ply_files_are_written_one_after_the_other(package, tmp_path):
+    """What was cut for the first one is gone from the view layer when the second is written."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    obj = patch("Patch")
+    for k in range(3):
+        before = set(bpy.data.objects), set(bpy.data.meshes)
+        assert package("files.export").export(tmp_path / f"{k}.ply", ".ply", [obj], False) == []
+        assert [x.name for x in bpy.context.view_layer.objects] == ["Patch"]
+        assert (set(bpy.data.objects), set(bpy.data.meshes)) == before
+    assert len({(tmp_path / f"{k}.ply").read_bytes() for k in range(3)}) == 1
