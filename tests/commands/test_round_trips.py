@@ -168,7 +168,7 @@ def test_workspaces_and_editors_of_a_blend_stay(run, tmp_path):
     views = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
     for view in views:
         if view.type == "VIEW_3D":
-            view.lens = 77
+            view.clip_end = 12345
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "in.blend", "--quality", "draft")[0] == 0
@@ -178,7 +178,7 @@ def test_workspaces_and_editors_of_a_blend_stay(run, tmp_path):
     assert "Mine \u00e4\u00f6" in names and first not in names
     assert bpy.data.workspaces["UV Editing"]["note"] == "kept"
     views = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
-    assert {round(view.lens) for view in views if view.type == "VIEW_3D"} == {77}
+    assert {round(view.clip_end) for view in views if view.type == "VIEW_3D"} == {12345}
 
 
 @pytest.mark.parametrize("target", [".glb", ".gltf", ".fbx"])

@@ -203,7 +203,8 @@ class VertexRows:
 
     def by_more(self, x: np.ndarray, colour: int) -> np.ndarray:
         """What `more_of_colours` makes of x (2n,), (v,2)."""
-        return (self.more_of_colours[colour] @ x).reshape(-1, 2)
+        more, own = self.more_of_colours, self.pattern.rows(colour)
+        return np.zeros((own.stop - own.start, 2)) if more is None else (more[colour] @ x).reshape(-1, 2)
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         found = np.empty(len(x))
@@ -282,8 +283,8 @@ class VertexRows:
             shifted = [sp.csr_matrix((x.data, x.indices + 2 * own.stop, x.indptr), (x.shape[0], 2 * n)) for x in both]
             upper.append(sp.vstack(shifted).tocsr()[_alternating(own.stop - own.start)])
         half = sp.vstack(upper).tocsr()
-        own = self._data[:, pattern.count :].transpose(1, 0, 2)
-        rows = half + half.T + sp.bsr_matrix((own, np.arange(n), np.arange(n + 1))).tocsr()
+        blocks = self._data[:, pattern.count :].transpose(1, 0, 2)
+        rows = half + half.T + sp.bsr_matrix((blocks, np.arange(n), np.arange(n + 1))).tocsr()
         rows = rows.tocsr() if self._more is None else rows.tocsr() + self._more
         place = np.empty(n, np.int64)
         place[pattern.order] = np.arange(n)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mesh.geometry import face_areas, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
-from .energy import AT_ONCE, Elements, Quads, elements, energies, energy, hat_gradients
+from .energy import AT_ONCE, Elements, Quads, elements, energies, hat_gradients
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
 MOST_TRIANGLES = 8
@@ -225,10 +225,10 @@ def energy_in_turn(faces: Elements, w: np.ndarray, area_weight: float | np.ndarr
     area_weight : one, or (p,) of the polygons
     """
     if len(faces.triangles) <= 4 * AT_ONCE:
-        return energy(faces, w, area_weight)
+        return float(energies(faces, w, area_weight).sum())
     value = np.empty(len(faces.area))
     for some, here, _, _ in in_turn(faces, AT_ONCE):
-        value[here] = energies(some, w, area_weight if np.ndim(area_weight) == 0 else area_weight[here])
+        value[here] = energies(some, w, area_weight[here] if isinstance(area_weight, np.ndarray) else area_weight)
     return float(value.sum())
 
 
