@@ -135,3 +135,10 @@ def test_parts_that_are_joined_for_the_map_hide_no_fold_and_no_overlap(judge):
         except Exception as error:
             error.add_note(f"case {seed}, {split_case(seed)[0]}, {split_case(seed)[3]}")
             raise
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("seed", [22_001_935])
+def test_what_ended_in_a_defect_once_is_a_layout_or_a_refusal_by_name(judge, seed):
+    """Places near the greatest number: the plane that seams mirror in was nowhere."""
+    assert outcome(judge, seed)[1] in ("clean", "told", "NonFiniteError")

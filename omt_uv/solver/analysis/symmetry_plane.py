@@ -112,10 +112,14 @@ class SymmetryPlane:
 
     def carried(self, old: np.ndarray, new: np.ndarray) -> SymmetryPlane:
         """The plane where the same vertices (n,3), (n,3) are scaled and moved."""
+        # By a power of two, which is exact: sums of what is near the greatest number would be beyond it.
+        power = np.frexp(np.abs(new).max())[1]
+        new = np.ldexp(new, -power)
         span = [2 * (p.max(axis=0) / 2 - p.min(axis=0) / 2) for p in (old, new)]
         k = int(span[0].argmax())
         scale = float(span[1][k] / span[0][k])
-        return replace(self, offset=float(scale * self.offset + (new[0] - scale * old[0]) @ self.normal))
+        offset = scale * self.offset + (new[0] - scale * old[0]) @ self.normal
+        return replace(self, offset=float(np.ldexp(offset, power)))
 
     def nearest_images(self, positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """For every vertex of a surface (n,3), (m,3) the one (n,) nearest to its image, and how far (n,) it lies.

@@ -374,9 +374,12 @@ class SeamSearch:
         if plane is None or not self.options.symmetric:
             return None
         points, own = component.positions, self.surface.positions[component.vertex_ids[real]]
+        # By a power of two, which is exact: heights of what is near the greatest number would be beyond it.
+        power = -np.frexp(np.abs(own).max(initial=0))[1]
+        own, offset = np.ldexp(own, power), np.ldexp(plane.offset, power)
         scale = np.ptp(points, axis=0).max() / max(np.ptp(own, axis=0).max(), 1e-300)
         height = points @ plane.normal
-        height = height - np.mean(height[real] - scale * (own @ plane.normal - plane.offset))
+        height = height - np.mean(height[real] - scale * (own @ plane.normal - offset))
         distance, image = cKDTree(points).query(points - 2 * height[:, None] * plane.normal)
         in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
         mirror = FineMirror(image, height, in_plane, exact=True)

@@ -122,3 +122,14 @@ def test_published_bodies(name):
     else:
         assert degrees_between(turn @ found[0].normal, found[1].normal) < 1e-4
         assert max(p.residual for p in found) <= NEAR
+
+
+@pytest.mark.parametrize("power", [-1000, 0, 1000, 1019])
+def test_a_plane_is_carried_to_any_unit(power):
+    """To the bit, but for the unit: beyond the greatest number it was nowhere, and the search for seams a defect."""
+    V, F = rough_head()
+    V, moved = V + 9, 3 * V + 1
+    plane = symmetry_plane(V, F)
+    far = plane.carried(V, np.ldexp(moved, power))
+    assert far.offset == np.ldexp(plane.carried(V, moved).offset, power) != 0 and np.isfinite(far.offset)
+    assert plane.carried(V, moved).distance(moved) == pytest.approx(3 * plane.distance(V), abs=1e-9)
