@@ -56,6 +56,22 @@ def test_the_uvs_follow_the_slider(patch, slider, package):
     assert (scenes.uv_of(patch) == seen[2]).all()
 
 
+def test_figures_of_the_moment_are_of_these_objects_and_of_this_moment(patch, slider, package):
+    state = package("session.last_run").state
+    operator, told = begin(), []
+    for balance in (0.0, 1.0):
+        slider.balance = balance
+        tick(operator, 40)
+        operator._show_now(bpy.context, package("session.following").current)
+        rows = dict(state.summary.rows)
+        told.append([float(rows[key].split()[0]) for key in ("Area error", "Shear")])
+        assert state.summary.objects == (patch.name,) and state.summary.beyond <= set(rows)
+        assert not state.outdated and not state.marks
+    # Areas get worse along the slider, and shear better.
+    assert told[0][0] < told[1][0] and told[0][1] > told[1][1]
+    operator.modal(bpy.context, event("ESC", "PRESS"))
+
+
 @pytest.mark.parametrize("tile", [1001, 1010, 1013, 1100])
 def test_what_is_accepted_is_packed_into_the_tile_of_the_last_unwrap(patch, slider, tile):
     operator, before = begin(pack=True), slider.tile

@@ -36,6 +36,8 @@ class Recorder:
     def __setattr__(self, name, value) -> None:
         if name in ("active", "enabled", "alert"):
             self.__dict__["state"] = f"{self.state}{name[0]}{int(value)}"
+        else:
+            self.record.append(f"{name}={value}")
 
     def __getattr__(self, name):
         if name in ("column", "row", "split", "box", "grid_flow", "column_flow"):

@@ -122,6 +122,9 @@ def test_handles_in_one_place_have_to_go_one_way():
     for away in ([0, 1.01, 0], [0, -1, 0], [0.002, 1, 0]):
         with pytest.raises(HandleError, match="one and other"):
             joined((one, FlowHandle(same.start, same.start + away, name="other")), 1.0)
+        # What has no name is told by its number.
+        with pytest.raises(HandleError, match="one and number 1"):
+            joined((one, FlowHandle(same.start, same.start + away)), 1.0)
     far = FlowHandle(one.start[:1] + 2e-3, one.start[:1] - 1)
     assert len(joined((one, far), 1.0)[0]) == 3
 

@@ -157,3 +157,18 @@ def test_moebius_maps_keep_the_circle_and_cross_ratios(mirrored):
     assert ratio(moved(inside)) == pytest.approx(before.conjugate() if mirrored else before)
     pairs = moebius_of_pairs(inside[:6], moved(inside[:6]), mirrored)
     np.testing.assert_allclose(pairs(inside), moved(inside), atol=1e-3)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_peaks_are_vertices_above_all_neighbours_and_apart(closed):
+    V, F = blob(2, seed=3) if closed else meshes.bumpy(9, 9)
+    value = np.random.default_rng(4).uniform(0, 1, len(V))
+    found = suggestions._peaks(value, 10 * V, F)
+    around = [set(F[(v == F).any(axis=1)].ravel()) - {v} for v in range(len(V))]
+    tops = {v for v in range(len(V)) if all(value[v] >= value[u] for u in around[v])}
+    assert set(found.tolist()) <= tops and len(found) == min(len(tops), suggestions.PEAKS)
+    assert (np.diff(value[found]) <= 0).all() and found[0] == value.argmax()
+    # Near one another, the higher one stays.
+    near = suggestions._peaks(value, 1e-6 * V, F)
+    assert near.tolist() == [value.argmax()]
+    assert not len(suggestions._peaks(0 * value, V, F))

@@ -302,3 +302,15 @@ def test_distances_in_the_plane_are_straight():
     # Paths go along triangles that are developed one by one, with what rounding off windows leaves.
     np.testing.assert_allclose(found[near], straight[near], atol=0.01)
     assert near[straight <= straight[start]].all()
+
+
+@pytest.mark.parametrize("marked_ones", [False, True])
+def test_shapes_that_are_turned_are_looked_for_by_spectra_and_marked_ones_as_they_lie(monkeypatch, marked_ones):
+    asked = []
+    agreeing = wasserstein._agreeing
+    monkeypatch.setattr(wasserstein, "_agreeing", lambda *given: asked.append(given) or agreeing(*given))
+    library = [(on_disk if marked_ones else some)(seed=seed) for seed in range(3)]
+    for k in (0, 2):
+        found = wasserstein.nearest(library[k], library, 2)
+        assert found[0][0] == k and len(found) == 2 and found[0][1].raw < 1e-6 < found[1][1].raw
+    assert len(asked) == (0 if marked_ones else 2)
