@@ -186,11 +186,11 @@ def check_picture(path: Path | None) -> None:
 
 def drain_shown(steps):
     """The result of a solver; a terminal shows its progress."""
-    from ..solver.progress import drain
+    from ..solver.progress import drain, part_of
 
     shown = sys.stderr.isatty()
     try:
-        return drain(steps, _show_progress if shown else None)
+        return drain(part_of(steps, 0.0, 1.0), _show_progress if shown else None)
     finally:
         if shown:
             print("\r\033[K", end="", file=sys.stderr)

@@ -60,7 +60,9 @@ class Run:
                 self.result = stop.value
                 self._watch.check(thoroughly=True)
                 return True
-            self.stage, self.fraction, self.early = progress.stage, progress.fraction, progress.early
+            # A solver may begin a round anew; the bar does not.
+            self.fraction = max(self.fraction, progress.fraction)
+            self.stage, self.early = progress.stage, progress.early
             if self.is_ending and self.early is not None:
                 self.early.ask()
             more = time.monotonic() - begin < seconds and not isinstance(progress, ThreadProgress)

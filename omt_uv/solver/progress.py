@@ -62,13 +62,15 @@ def drain(steps: Steps[T], callback: Callable[[Progress], None] | None = None) -
 
 def part_of(steps: Steps[T], start: float, width: float, stage: str | None = None) -> Steps[T]:
     """Run a solver as that part of a longer job which goes from fraction `start` to `start + width` of it; stage: what
-    the job is doing meanwhile, by default what the solver says."""
+    the job is doing meanwhile, by default what the solver says. Where the solver begins a round anew, the job waits."""
+    reached = 0.0
     while True:
         try:
             progress = next(steps)
         except StopIteration as stop:
             return stop.value
-        yield Progress(stage or progress.stage, min(start + width * progress.fraction, 1.0), progress.early)
+        reached = max(reached, progress.fraction)
+        yield Progress(stage or progress.stage, min(start + width * reached, 1.0), progress.early)
 
 
 def unless_ended(steps: Steps[T], early: EarlyEnd) -> Steps[T | None]:

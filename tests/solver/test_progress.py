@@ -34,6 +34,16 @@ def test_a_part_of_a_job():
     assert [p.fraction for p in seen] == pytest.approx([0.5, 0.55, 0.6, 0.65])
 
 
+def test_a_part_waits_where_its_solver_begins_anew():
+    def rounds():
+        for fraction in (0.0, 0.6, 0.2, 0.4, 0.9):
+            yield Progress("Rounds", fraction)
+
+    seen = []
+    drain(part_of(rounds(), 0.5, 0.5), seen.append)
+    assert [p.fraction for p in seen] == pytest.approx([0.5, 0.8, 0.8, 0.8, 0.95])
+
+
 def test_what_can_be_done_without_ends_when_it_is_asked():
     """Through parts of jobs and threads, too; the solver is closed, and without being asked it goes to its end."""
     closed, early = [], EarlyEnd()
