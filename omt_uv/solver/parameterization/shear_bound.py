@@ -407,6 +407,14 @@ def in_pieces(
     return replace(prepared, charts=new_charts, cuts=joined(search, cuts, np.concatenate(edges))), new_maps
 
 
+def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
+    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
+    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
+    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
+    most = float(pressing.max(initial=0.0)) / search.shear.bound
+    return most <= 1 or most > 1 + NEARLY
+
+
 def _pieces(
     search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float, map_charts
 ) -> Steps[tuple[tuple[list[Chart], list[ChartMap]], np.ndarray]]:

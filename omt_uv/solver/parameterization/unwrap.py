@@ -45,7 +45,7 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import bound_shear, in_pieces
+from .shear_bound import bound_shear, in_pieces, is_worth_bounding
 from .shear_search import ShearSearch
 from .small_charts import is_small, map_together
 
@@ -155,8 +155,8 @@ def unwrap(
     if cut.search is not None and crossing is not None and target is None:
         pieces = in_pieces(cut.search, prepared, maps, task.map_charts)
         apart, parts = yield from part_of(pieces, 1 - PIECES, PIECES / 2)
-        if len(parts) > len(maps) and not settled:
-            # Limbs shear more than the mean of them and all else.
+        if len(parts) > len(maps) and not settled and is_worth_bounding(cut.search, apart, parts):
+            # Limbs can shear more than the mean of them and all else.
             further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing)
             found = yield from part_of(further, 1 - PIECES / 2, PIECES / 2)
             apart, parts, missed = found.prepared, found.maps, found.warnings

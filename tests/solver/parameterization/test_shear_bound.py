@@ -374,6 +374,15 @@ def test_parts_of_what_came_apart_have_cuts_of_their_own_where_these_are_shorter
     assert drain(shear_bound._parts_cut_anew(search, after, map_charts, shear_bound.EarlyEnd())) is after
 
 
+@pytest.mark.parametrize("shears, worth", [((1.1, 1.3), True), ((1.1, 1.32), False), ((1.1, 1.36), True), ((), True)])
+def test_pieces_are_bounded_again_where_none_misses_the_bound_or_one_does_by_much(monkeypatch, shears, worth):
+    """What misses it by a hundredth stays: the mean of all has kept it."""
+    round_of = SimpleNamespace(of=lambda *_: SimpleNamespace(pressing=np.array(shears, float)))
+    monkeypatch.setattr(shear_bound, "Round", round_of)
+    search = SimpleNamespace(shear=ShearBound(1.3), memory={})
+    assert shear_bound.is_worth_bounding(search, SimpleNamespace(charts=[], found_cuts=None), []) == worth
+
+
 def test_what_misses_the_bound_by_little_keeps_it_with_areas_as_exact_as_is_promised(monkeypatch):
     """Where no further search is allowed, and not for qualities that promise more."""
     V, F = meshes.random_disk(800, height=0)
