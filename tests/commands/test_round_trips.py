@@ -161,7 +161,7 @@ def test_a_rigged_scene_keeps_all_but_its_uvs(package, run, tmp_path, suffix):
 
 def test_workspaces_and_editors_of_a_blend_stay(run, tmp_path):
     """They were replaced by those of a new file: an artist's windows were gone after a run over the only copy."""
-    bpy.ops.wm.read_factory_settings(use_empty=False)
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
     first = bpy.data.workspaces[0].name
     bpy.data.workspaces[first].name = "Mine \u00e4\u00f6"
     bpy.data.workspaces["UV Editing"]["note"] = "kept"
@@ -170,9 +170,9 @@ def test_workspaces_and_editors_of_a_blend_stay(run, tmp_path):
         if view.type == "VIEW_3D":
             view.clip_end = 12345
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "in.blend", "--quality", "draft")[0] == 0
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "in.blend"), load_ui=True)
     names = {workspace.name for workspace in bpy.data.workspaces}
     assert "Mine \u00e4\u00f6" in names and first not in names

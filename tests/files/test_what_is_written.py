@@ -272,7 +272,7 @@ def test_a_blend_holds_every_mesh_bit_by_bit_or_is_refused_by_the_name_of_the_on
 
 def test_several_ply_files_are_written_one_after_the_other(package, tmp_path):
     """What was cut for the first one is gone from the view layer when the second is written."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = patch("Patch")
     for k in range(3):
         before = set(bpy.data.objects), set(bpy.data.meshes)
