@@ -176,6 +176,8 @@ def _write_stl(path: Path, objects: Objects, everything: bool) -> list[str]:
 
 def _write_glb(path: Path, objects: Objects, everything: bool) -> list[str]:
     """Write a binary glTF file; returns warnings."""
+    # Blender 4.2 crashes now and then where its exporter is the first to look at what has been removed.
+    bpy.context.view_layer.update()
     if not everything:
         _select_only(objects)
     meshes = [obj.data for obj in exported_meshes(objects, everything)]
