@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.geometry import face_areas, face_normals
+from ..mesh.geometry import below_one, face_areas, face_normals
 from ..mesh.mirror import find_mirror
 from ..mesh.topology import expand
 from .occlusion import half_sphere
@@ -112,14 +112,12 @@ class SymmetryPlane:
 
     def carried(self, old: np.ndarray, new: np.ndarray) -> SymmetryPlane:
         """The plane where the same vertices (n,3), (n,3) are scaled and moved."""
-        # By a power of two, which is exact: sums of what is near the greatest number would be beyond it.
-        power = np.frexp(np.abs(new).max())[1]
-        new = np.ldexp(new, -power)
+        new, exponent = below_one(new)
         span = [2 * (p.max(axis=0) / 2 - p.min(axis=0) / 2) for p in (old, new)]
         k = int(span[0].argmax())
         scale = float(span[1][k] / span[0][k])
         offset = scale * self.offset + (new[0] - scale * old[0]) @ self.normal
-        return replace(self, offset=float(np.ldexp(offset, power)))
+        return replace(self, offset=float(np.ldexp(offset, exponent)))
 
     def nearest_images(self, positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """For every vertex of a surface (n,3), (m,3) the one (n,) nearest to its image, and how far (n,) it lies.

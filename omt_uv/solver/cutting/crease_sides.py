@@ -11,10 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..analysis.feature_edges import fold_angles
-from ..maps.contacts import lies_apart
 from ..maps.development import developed
-from ..maps.overlap import cover_pairs, overlap_share
-from ..mesh.geometry import as_points, face_areas, signed_areas
+from ..maps.overlap import cover_pairs, covered_share
+from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, pair_keys, paired
@@ -108,7 +107,9 @@ def _has_clear_net(component: CutComponent) -> bool:
     # Corners of bevels do not lie flat, and what covers itself for that is little.
     flat, corners, _ = _laid_out(component, found.cut, np.ones(len(component.triangles), dtype=bool))
     area, (wide, high) = face_areas(component.positions, component.triangles).sum(), _boxes(flat)
-    return area >= SPRAWLING * float(np.maximum(wide, high).max()) ** 2 and _covered(flat, corners) <= MUCH
+    return (
+        area >= SPRAWLING * float(np.maximum(wide, high).max()) ** 2 and covered_share(flat, corners, SAMPLES) <= MUCH
+    )
 
 
 def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
@@ -336,7 +337,7 @@ def _lies_flat(
     return (
         gap <= GAP * extent
         and area >= filled * float(np.prod(_boxes(flat), axis=0).min())
-        and _covered(flat, corners) <= COVERED
+        and covered_share(flat, corners, SAMPLES) <= COVERED
         and _part_covered(flat, corners, np.flatnonzero(part[rows])) <= COVERED_PART
     )
 
@@ -366,8 +367,3 @@ def _part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> fl
     twice = np.unique(point[over != part[point // 3]])
     area = np.abs(signed_areas(uv[part].reshape(-1, 2), np.arange(3 * len(part)).reshape(-1, 3)))
     return float(area[twice // 3].sum() / (3 * area.sum()))
-
-
-def _covered(flat: np.ndarray, corners: np.ndarray) -> float:
-    """Which share of themselves triangles (t,3) with places (k,) complex cover."""
-    return 0.0 if lies_apart(flat, corners) else overlap_share(as_points(flat)[corners], samples=SAMPLES)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import cross2
+from ..mesh.geometry import as_points, cross2
 from ..mesh.topology import expand
+from .contacts import lies_apart
 
 SAMPLES = 200_000  # points by default: a standard error of 0.1 % of the area
 CHUNK = 2_000_000  # pairs of a sample and a face tested at once, for memory
@@ -35,6 +36,11 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
     covered = [grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)]) if len(chunk)]
     return float((np.concatenate(covered) > 1).mean())
+
+
+def covered_share(w: np.ndarray, triangles: np.ndarray, samples: int = SAMPLES) -> float:
+    """`overlap_share` of triangles (m,3) with places w (n,) complex; 0 without samples where their outline says so."""
+    return 0.0 if lies_apart(w, triangles) else overlap_share(as_points(w)[triangles], samples=samples)
 
 
 def cover_pairs(uv: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -114,6 +114,13 @@ def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return part_by_part(areas, triangles)
 
 
+def below_one(points: np.ndarray) -> tuple[np.ndarray, int]:
+    """Points (n,d) divided by a power of two, which is exact, so that none has a coordinate of 1 or more, and the
+    exponent: sums of what is near the greatest number would be beyond it."""
+    exponent = int(np.frexp(np.abs(points).max(initial=0.0))[1])
+    return np.ldexp(points, -exponent), exponent
+
+
 def unit(v: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) of length one; 0 stays 0."""
     length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]

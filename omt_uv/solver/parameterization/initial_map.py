@@ -131,6 +131,11 @@ class DiskMesh:
         return mean_value_sites(self.vertices, self.triangles, self.loop, None, Disk())
 
     @cached_property
+    def is_far(self) -> bool:
+        """Whether the target is far from the areas of the triangles."""
+        return is_far(self.target, face_areas(self.vertices, self.triangles))
+
+    @cached_property
     def flat(self) -> FlatDisk | None:
         """The disk flattened with the boundary as it comes; None where double precision has no such map."""
         try:
@@ -192,24 +197,22 @@ def coarse_initial_map(
 
     flat (n,2) : an embedding, a mean value map by default; draft : the map had better have its areas at once
     """
-    far = is_far(disk.target, face_areas(disk.vertices, disk.triangles))
-    if flat is None and len(disk.vertices) > EMBEDDED and not (far or draft):
+    if flat is None and len(disk.vertices) > EMBEDDED and not (disk.is_far or draft):
         try:
-            found = yield from _coarse_initial_map(disk, balance, log, None, (False, False, False))
+            found = yield from _coarse_initial_map(disk, balance, log, None, draft=False, embedded=False)
         except MeshError:
             # An embedding of all of it says what it is.
             found = None
         if found is not None and map_energy(found.uv, disk.vertices, disk.triangles) < HOPELESS:
             return found
-    return (yield from _coarse_initial_map(disk, balance, log, flat, (far, draft, True)))
+    return (yield from _coarse_initial_map(disk, balance, log, flat, draft, embedded=True))
 
 
 def _coarse_initial_map(
-    disk: DiskMesh, balance: float, log: RunLog, flat: np.ndarray | None, options: tuple[bool, bool, bool]
+    disk: DiskMesh, balance: float, log: RunLog, flat: np.ndarray | None, draft: bool, embedded: bool
 ) -> Steps[InitialChartMap | None]:
-    """The same; options: whether the targets are far from the areas, it is a draft, and the mesh itself is embedded, in
-    place of the coarser one alone."""
-    (far, draft, embedded), vertices, triangles = options, disk.vertices, disk.triangles
+    """The same; embedded: the mesh itself is, in place of the coarser one alone."""
+    far, vertices, triangles = disk.is_far, disk.vertices, disk.triangles
     give_back_of(len(vertices))
     with log.timed("coarsening"):
         if flat is None and embedded:
@@ -299,11 +302,9 @@ def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, draft: bool) -
 
 
 def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
-    """A disk of a middle size with a free boundary, flattened as that comes or mapped by evened weights; None where
-    neither gives it room."""
+    """A free disk of a middle size, flattened as it comes or mapped by evened weights; None where neither has room."""
     n = len(disk.vertices)
-    far = is_far(disk.target, face_areas(disk.vertices, disk.triangles))
-    if far or disk.boundary != "free" or not EVENED_ABOVE < n <= DIRECT_WITH_ROOM:
+    if disk.boundary != "free" or not EVENED_ABOVE < n <= DIRECT_WITH_ROOM or disk.is_far:
         return None
     with log.timed("flattening"):
         faces = elements(disk.vertices, disk.triangles, disk.target)
@@ -333,7 +334,7 @@ def _roomy_flat(disk: DiskMesh, faces: Elements) -> np.ndarray | None:
 def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
     """A disk of at most a middle size embedded in its domain by evened weights; None where that squeezes it. It
     leaves as little to do as conformal map and transport, which take as long as all of the refinement."""
-    if len(disk.vertices) > DIRECT_WITH_ROOM or is_far(disk.target, face_areas(disk.vertices, disk.triangles)):
+    if len(disk.vertices) > DIRECT_WITH_ROOM or disk.is_far:
         return None
     faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
     with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):

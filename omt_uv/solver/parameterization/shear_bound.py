@@ -10,6 +10,7 @@ import numpy as np
 
 from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
+from ..maps.development import unrolled
 from ..mesh.charts import Chart, part_of_chart, sound_disks
 from ..mesh.geometry import edge_lengths, face_areas
 from ..mesh.topology import boundary_edges, pair_keys
@@ -314,7 +315,6 @@ def _apart(
     chosen = [k for k in last.searched if last.maps[k].failure is None]
     if not chosen:
         return found, flat, crossed
-    from ..maps.development import unrolled
     from ..seams.parting import flat_sides  # Hardly any chart misses its bound.
 
     for k in chosen:

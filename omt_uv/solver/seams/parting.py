@@ -15,11 +15,11 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
 from ..analysis.symmetry_plane import MirrorImages
-from ..maps.contacts import lies_apart
+from ..cutting.crease_sides import COVERED, SHARED
 from ..maps.development import developed
-from ..maps.overlap import cover_pairs, overlap_share
+from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.charts import Chart
-from ..mesh.geometry import as_points, edge_lengths, face_areas, unit
+from ..mesh.geometry import edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
 from .options import COMPACT
 from .path_graph import path_to
@@ -65,10 +65,6 @@ PIECE = 1.2
 MOST_PIECES = 12
 # A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
 NEAR_CUT = 0.2
-# Flat sides stay together across a line that is this share of the outline of the smaller one, if they cover no more
-# than a share of themselves when they are unfolded.
-SHARED = 0.15
-COVERED = 2e-3
 # Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
 MEAN_CAPACITY = 10_000
 MOST_CAPACITY = 10_000_000
@@ -282,7 +278,7 @@ def _lies_flat(positions: np.ndarray, triangles: np.ndarray, side: np.ndarray, s
     first = np.unique(label, return_index=True)[1]
     faces = label[index.reshape(-1, 3)]
     flat, _ = developed(positions[nodes[first] % len(positions)], faces)
-    return lies_apart(flat, faces) or overlap_share(as_points(flat)[faces]) <= COVERED
+    return covered_share(flat, faces) <= COVERED
 
 
 def slits(

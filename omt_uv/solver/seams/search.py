@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from ..analysis.seam_costs import SeamCosts
 from ..analysis.symmetry_plane import NEAR
 from ..cutting.component import CutComponent, fingerprint
+from ..mesh.geometry import below_one
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from .coarse_cut import CoarseCut, Found, Setting, best_of, hub
@@ -374,9 +375,8 @@ class SeamSearch:
         if plane is None or not self.options.symmetric:
             return None
         points, own = component.positions, self.surface.positions[component.vertex_ids[real]]
-        # By a power of two, which is exact: heights of what is near the greatest number would be beyond it.
-        power = -np.frexp(np.abs(own).max(initial=0))[1]
-        own, offset = np.ldexp(own, power), np.ldexp(plane.offset, power)
+        own, exponent = below_one(own)
+        offset = np.ldexp(plane.offset, -exponent)
         scale = np.ptp(points, axis=0).max() / max(np.ptp(own, axis=0).max(), 1e-300)
         height = points @ plane.normal
         height = height - np.mean(height[real] - scale * (own @ plane.normal - offset))
