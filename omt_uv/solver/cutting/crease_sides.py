@@ -31,13 +31,15 @@ TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
 # whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of so many sides
 # that nearly all unroll, or half where nearly all borders are hard: low ones of animals are folded everywhere, into
-# small sides and bluntly.
+# small sides and bluntly. Of so few sides, as bodies of few polygons have, fewer borders need be hard.
 LARGE = 0.03
 MOSTLY = 0.7
 HALF = 0.5
 SHARP = 0.8
 ALL = 0.95
 MOST_SIDES = 2_000
+FEW_SIDES = 64
+KEEN = 0.45
 # A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
 # would have to be longer or shorter by the second share, and is shorter than the third: where a hole is countersunk.
 COMPACT = 0.3
@@ -133,7 +135,10 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     # Of noise every triangle is a side.
     few = len(area) <= MOST_SIDES
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
-    if not sure and not (few and area[unrolls].sum() >= ALL * area.sum()):
+    unrolled = area[unrolls].sum() >= ALL * area.sum()
+    # A body of few polygons is made of few sides that unroll; those of tubes are all blunt.
+    sure |= unrolled and mostly >= MOSTLY and len(area) <= FEW_SIDES and keen >= KEEN
+    if not sure and not (few and unrolled):
         return None
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
     whole = _with_bands(pair, length[border], blunt, large, area)[side]

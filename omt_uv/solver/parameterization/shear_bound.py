@@ -12,20 +12,18 @@ from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
 from ..maps.development import unrolled
 from ..mesh.charts import Chart, part_of_chart, sound_disks
-from ..mesh.geometry import edge_lengths, face_areas
-from ..mesh.topology import boundary_edges, pair_keys
+from ..mesh.geometry import face_areas
+from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import COMPACT, SPREAD_BY_SHEAR
 from .chart_indices import but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear, measured_map
 from .convex_maps import with_figures
 from .mirrored_charts import mapped_anew
-from .shear_search import MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, ShearSearch, joined, pressing_shear
+from .shear_search import MARGIN, MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, ShearSearch, joined, pressing_shear
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
-# What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
-MARGIN = 0.95
 # What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
 CROWDED = 1.35
 # After a second search, what lies on itself comes apart where that leaves this share of what is missing at most.
@@ -49,8 +47,9 @@ SPARED = 0.05
 # cut would go across what lies flat along its edges.
 LARGE_PART = 0.03
 UNSHEARED = 1.001
-# What has no map is asked for this share of what cuts have left.
-UNKNOWN = 0.5
+# Charts that shear more come apart around flat sides, where that leaves no more than this share of log(shear).
+SHEARED_SIDES = 1.05
+LEFT = 0.5
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 # Where charts lie on themselves that may, before that.
@@ -90,8 +89,8 @@ def bound_shear(
     map_sparing : a solver that shears less, for areas which are no more exact than is promised.
     Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
     """
-    early = EarlyEnd()
-    best = last = Round.of(search, first.charts, maps, first.found_cuts, search.memory)
+    early, free = EarlyEnd(), crossing is not None
+    best = last = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried, worse = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]]()
     rehearsed, crossed = dict[str, Any](), False
@@ -115,10 +114,10 @@ def bound_shear(
         if parts is None or (is_stuck and not parts[0]):
             break
         apart, flat, crossed = parts
-        missed = _to_be_searched(last, apart)
+        missed = last.to_be_searched(apart)
         if not (missed or apart):
             break
-        share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
+        share, promised = last.shares(missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
         changes = {"share": share, "adding": rounds > 1} | rehearsed  # Another draw may be worse, what is added is not.
         asked = _Asked.of(last, missed, apart, flat, spread, changes, tried)
@@ -135,6 +134,32 @@ def bound_shear(
     if not early.is_asked:
         best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
     return _result(best, search, first.warnings, early)
+
+
+def _first_round(
+    search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap], map_charts, free: bool, early: EarlyEnd
+) -> Steps[Round]:
+    """Charts and maps as they are; if boundaries are free, those come apart around large flat sides between sharp edges
+    where that takes most of what they are sheared away: a blade shows it although its chart keeps the bound."""
+    first = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory)
+    if not free or search.target is not None:  # A density asked for shears what is flat.
+        return first
+    from ..seams.parting import flat_sides
+
+    may = [search.shear.further or not is_marked(search.surface, chart) for chart in first.charts]
+    sheared = (first.mean > SHEARED_SIDES) & (first.area > LARGE_PART * first.area.sum()) & may
+    sides = {int(k): flat_sides(first.charts[k], sharp=True) for k in np.flatnonzero(sheared)}
+    sides = {k: edges for k, edges in sides.items() if len(edges)}
+    if not sides:
+        return first
+    asked = _Asked.of(first, [], sides, list(sides), search.first_spread(), {}, set())
+    new = yield from _cut_anew(search, first, asked, map_charts, early)
+    if new is None:
+        return first
+    of, count = first.chart_of(search, new), len(first.charts)
+    left = np.bincount(of, new.area * np.log(new.mean), count) > LEFT * first.area * np.log(first.mean)
+    stay = left | (np.bincount(of, new.missing, count) > first.missing)
+    return first if stay.all() else first.merged(search, new, of, stay)
 
 
 @dataclass(frozen=True)
@@ -163,13 +188,6 @@ class _Asked:
         chosen = [*missed, *flat]
         kept = [but_within(last.cuts.edges, [last.charts[k] for k in chosen]), *apart.values()]
         return _Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
-
-
-def _to_be_searched(last: Round, apart: dict[int, np.ndarray]) -> list[int]:
-    """Charts to be searched again: not what comes apart, nor where a search has hardly got on, since such searches are
-    long and the next one would get no farther."""
-    stuck = [k for k in last.searched if any(one.is_stuck for one in last.found_for(k))]
-    return [k for k in last.searched if k not in apart and k not in stuck]
 
 
 def _cut_anew(search: ShearSearch, last: Round, asked: _Asked, map_charts, early: EarlyEnd) -> Steps[Round | None]:
@@ -215,7 +233,7 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
 def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound with shorter cuts, where rehearsals had asked for more than maps needed, if these keep
     the bound, too; as it is otherwise."""
-    longer = [k for k in range(len(last.charts)) if _has_slack(last, k)]
+    longer = [k for k in range(len(last.charts)) if last.has_slack(k)]
     if not longer:
         return last
     kept = but_within(last.cuts.edges, [last.charts[k] for k in longer])
@@ -226,7 +244,7 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
     for k, hope in enumerate(HOPES):
         share = np.ones(search.count)
         for chart in longer:
-            share[last.charts[chart].faces] = _share_allowed(last, chart) ** hope
+            share[last.charts[chart].faces] = last.share_allowed(chart) ** hope
         spread = search.first_spread() * share**SPREAD_BY_SHEAR
         asked = _Asked(longer, kept, spread, {"share": share, "adding": True}, is_worth)
         cutting = _cut_anew(search, last, asked, map_charts, early)
@@ -257,43 +275,9 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     of = last.chart_of(search, new)
     missed = np.bincount(of, new.pressing > new.bound, len(last.charts)) > 0
     # The outline of a part is there before and after.
-    length = np.array([_outline_length(chart) for chart in last.charts])
-    shorter = np.bincount(of, [_outline_length(chart) for chart in new.charts], len(length)) < length
+    shorter = np.bincount(of, new.outline_length, len(last.charts)) < last.outline_length
     stay = missed | ~shorter
     return last if stay.all() else last.merged(search, new, of, stay)
-
-
-def _outline_length(chart: Chart) -> float:
-    return float(edge_lengths(chart.vertices, boundary_edges(chart.triangles)).sum())
-
-
-def _share_allowed(last: Round, k: int) -> float:
-    """How many times the square of log(shear) of chart k may be."""
-    return float(MARGIN * np.log(last.bound) ** 2 / np.log(last.pressing[k]) ** 2)
-
-
-def _has_slack(last: Round, k: int) -> bool:
-    """Whether chart k, as it was rehearsed, shears so much less than the bound that a shorter cut may do."""
-    return bool(last.has_room[k]) and any(one.rehearsed is not None for one in last.found_for(k))
-
-
-def _shares(last: Round, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (f,) of what cuts have left that are asked of the next, and squares (f,) of log(shear) that these promise.
-
-    promised (f,) : by the last search
-    """
-    share, promised = np.ones(len(promised)), promised.copy()
-    for k in missed:
-        faces, reached = last.charts[k].faces, np.log(last.pressing[k]) ** 2
-        if last.maps[k].failure is not None:
-            # How far it is from a map nobody knows.
-            share[faces] = UNKNOWN
-            continue
-        # What the last search has promised and its map has not kept is asked for on top.
-        kept_part = min(float(promised[faces].min()) / reached, 1.0)
-        share[faces] = margin * kept_part * np.log(last.bound) ** 2 / reached
-        promised[faces] = share[faces] * reached
-    return share, promised
 
 
 def _apart(

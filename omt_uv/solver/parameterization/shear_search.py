@@ -19,7 +19,7 @@ from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
-from ..mesh.topology import pair_keys
+from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import Steps, part_of
 from .chart_indices import identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
@@ -47,6 +47,10 @@ NEARLY = 0.03
 LITTLE = 0.1
 # A chart with less than this share of the square of log(shear) that the bound allows may do with a shorter cut.
 SLACK = 0.85
+# What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
+MARGIN = 0.95
+# What has no map is asked for this share of what cuts have left.
+UNKNOWN = 0.5
 # Of a surface in one piece the largest chart has this share of the area, but for crumbs.
 ONE_PIECE = 0.97
 
@@ -259,6 +263,42 @@ class Round:
         """What searches have found for chart k as a whole."""
         faces = np.unique(self.charts[k].faces)
         return [one for one in self.memory.values() if np.array_equal(np.unique(one.polygons), faces)]
+
+    def to_be_searched(self, apart: dict[int, np.ndarray]) -> list[int]:
+        """Charts to be searched again: not what comes apart, nor where a search has hardly got on, since such searches
+        are long and the next one would get no farther."""
+        stuck = [k for k in self.searched if any(one.is_stuck for one in self.found_for(k))]
+        return [k for k in self.searched if k not in apart and k not in stuck]
+
+    def shares(self, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Shares (f,) of what cuts have left that are asked of the next, and squares (f,) of log(shear) that these
+        promise; promised (f,) : by the last search"""
+        share, promised = np.ones(len(promised)), promised.copy()
+        for k in missed:
+            faces, reached = self.charts[k].faces, np.log(self.pressing[k]) ** 2
+            if self.maps[k].failure is not None:
+                # How far it is from a map nobody knows.
+                share[faces] = UNKNOWN
+                continue
+            # What the last search has promised and its map has not kept is asked for on top.
+            kept_part = min(float(promised[faces].min()) / reached, 1.0)
+            share[faces] = margin * kept_part * np.log(self.bound) ** 2 / reached
+            promised[faces] = share[faces] * reached
+        return share, promised
+
+    @property
+    def outline_length(self) -> np.ndarray:
+        """The length (k,) of what is around each chart, both sides of a seam within it."""
+        outlines = [edge_lengths(chart.vertices, boundary_edges(chart.triangles)) for chart in self.charts]
+        return np.array([float(lengths.sum()) for lengths in outlines])
+
+    def share_allowed(self, k: int) -> float:
+        """How many times the square of log(shear) of chart k may be."""
+        return float(MARGIN * np.log(self.bound) ** 2 / np.log(self.pressing[k]) ** 2)
+
+    def has_slack(self, k: int) -> bool:
+        """Whether chart k, as it was rehearsed, shears so much less than the bound that a shorter cut may do."""
+        return bool(self.has_room[k]) and any(one.rehearsed is not None for one in self.found_for(k))
 
     @property
     def missing(self) -> np.ndarray:

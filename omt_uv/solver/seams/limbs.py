@@ -20,19 +20,29 @@ from ..mesh.geometry import edge_lengths, face_areas, signed_areas
 from ..mesh.topology import pair_keys
 from ..packing.pack_square import pack
 from ..progress import drain
+from .options import COMPACT
 from .parting import (
     LEAST_PART,
     PolygonGraph,
     capacities,
-    in_pieces,
     lies_on_its_image,
     minimum_cut,
-    pieces_of_band,
     with_images,
 )
 
 # Charts that have not this share of a surface stay in one piece.
 MOSTLY = 0.5
+# A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
+# length or whatever it is, is a band, cut across in so many times as long pieces, at most so many. A narrow one with
+# less than this share of the area is one from COMPACT on: all others would be small for its sake.
+LONG_AND_NARROW = 1.8
+SMALL = 0.4
+NARROW = 1 / 3
+LONG = 3.0
+PIECE = 1.2
+MOST_PIECES = 12
+# A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
+NEAR_CUT = 0.2
 # What is up in space, (3,); None where nobody knows.
 Up = Sequence[float] | None
 # A chart that fills less of the square around it sprawls; cuts are made where the pieces fill so many times as much
@@ -79,6 +89,33 @@ def may_come_apart(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
 
 def _count_of_band(chart: Chart, uv: np.ndarray, whole: float) -> int:
     return pieces_of_band(uv, np.sqrt(whole), face_areas(chart.vertices, chart.triangles).sum() / whole)
+
+
+def pieces_of_band(uv: np.ndarray, side: float, share: float = 1.0) -> int:
+    """In how many pieces a chart with map uv (n,2) is to be cut across, next to a square with such a side, of which it
+    fills a share: 1 where it is no band."""
+    centred = uv - uv.mean(axis=0)
+    width, length = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
+    narrow = COMPACT if share < SMALL else LONG_AND_NARROW
+    longest = (narrow if width <= NARROW * length else LONG) * side
+    return min(int(np.ceil(length / (PIECE * side))), MOST_PIECES) if length > longest else 1
+
+
+def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The piece (m,) of every triangle where a long chart with map uv (n,2) is cut across in `count` of about the same
+    length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
+    graph = PolygonGraph.of(chart)
+    middle = graph.places(chart, uv)
+    middle -= graph.area @ middle / graph.area.sum()
+    along = middle @ np.linalg.eigh(middle.T @ (graph.area[:, None] * middle))[1][:, 1]
+    along = (along - along.min()) / max(np.ptp(along), 1e-300)
+    capacity, cut = capacities(graph.prices(chart, cost)), np.zeros(len(graph.joined), dtype=bool)
+    for k in range(1, count):
+        before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
+        if before.any() and after.any():
+            side = minimum_cut(graph, capacity, np.flatnonzero(before), np.flatnonzero(after))
+            cut |= graph.around(side)
+    return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 
 
 def sprawls(chart: Chart, uv: np.ndarray, up: Up) -> bool:

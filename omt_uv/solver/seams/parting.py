@@ -16,12 +16,12 @@ from scipy.spatial import cKDTree
 
 from ..analysis.symmetry_plane import MirrorImages
 from ..cutting.crease_sides import COVERED, SHARED
+from ..cutting.developable_nets import HARD
 from ..maps.development import developed
 from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
-from .options import COMPACT
 from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
@@ -54,17 +54,8 @@ LEAST_OUTLINE = 6
 # share of it, it is no body of flat sides.
 LEAST_SIDE = 0.05
 MOSTLY = 0.4
-# A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
-# length or whatever it is, is a band, cut across in so many times as long pieces, at most so many. A narrow one with
-# less than this share of the area is one from COMPACT on: all others would be small for its sake.
-LONG_AND_NARROW = 1.8
-SMALL = 0.4
-NARROW = 1 / 3
-LONG = 3.0
-PIECE = 1.2
-MOST_PIECES = 12
-# A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
-NEAR_CUT = 0.2
+# An outline is sharp with this share of it.
+MOSTLY_SHARP = 0.5
 # Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
 MEAN_CAPACITY = 10_000
 MOST_CAPACITY = 10_000_000
@@ -217,11 +208,11 @@ def _without_crumbs(chart: Chart, graph: PolygonGraph, cut: np.ndarray, both: np
     return cut
 
 
-def flat_sides(chart: Chart) -> np.ndarray:
+def flat_sides(chart: Chart, sharp: bool = False) -> np.ndarray:
     """Edges (k,2) of the surface around the large flat sides of a chart; none where these are not most of it.
 
     What is between them are bands, as the teeth of a gear, that unroll: only flat sides with much of an outline hold
-    them back.
+    them back. sharp : only those whose outline is so for the most part
     """
     graph = PolygonGraph.of(chart, glued=True)
     corners = chart.vertices[chart.triangles]
@@ -238,14 +229,36 @@ def flat_sides(chart: Chart) -> np.ndarray:
     flat = (size >= FLAT * area) & (area >= LEAST_SIDE * graph.area.sum()) & (outline >= LEAST_OUTLINE)
     if area[flat].sum() < MOSTLY * graph.area.sum():
         return np.zeros((0, 2), np.int64)
-    return graph.ends[(one != other) & (flat[one] | flat[other]) & ~_unfolded(chart, graph, side, flat)]
+    unfolded = _unfolded(chart, graph, side, flat)
+    if sharp:
+        fold = np.arccos(np.clip(np.einsum("ed,ed->e", *normal[graph.joined.T]), -1, 1))
+        flat &= np.bincount(side, _in_sharp_outlines(chart, graph, near | unfolded, fold > HARD), len(area)) > 0
+        if area[flat].sum() < MOSTLY * graph.area.sum():
+            return np.zeros((0, 2), np.int64)
+    return graph.ends[(one != other) & (flat[one] | flat[other]) & ~unfolded]
+
+
+def _in_sharp_outlines(chart: Chart, graph: PolygonGraph, kept: np.ndarray, sharp: np.ndarray) -> np.ndarray:
+    """Polygons (p,) bool in pieces joined across edges that are kept (e,) bool, where most of the outline is of sharp
+    edges (e,) bool."""
+    piece = graph.pieces(kept)
+    pair = piece[graph.joined]
+    length = np.where(pair[:, 0] != pair[:, 1], edge_lengths(_of_surface(chart), graph.ends), 0.0)
+    outline, hard = (np.bincount(pair.ravel(), np.repeat(x, 2), len(piece)) for x in (length, length * sharp))
+    return (hard > MOSTLY_SHARP * outline)[piece]
+
+
+def _of_surface(chart: Chart) -> np.ndarray:
+    """Positions (n,3) of the vertices of the surface that are in a chart, zeros for others."""
+    inner, positions = chart.vertex_ids >= 0, np.zeros((int(chart.vertex_ids.max()) + 1, 3))
+    positions[chart.vertex_ids[inner]] = chart.vertices[inner]
+    return positions
 
 
 def _unfolded(chart: Chart, graph: PolygonGraph, side: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """Edges (e,) bool in the lines across which sides (p,) of polygons that are flat (s,) bool unfold beside one
     another, as those of a blade do; the longest lines first."""
-    inner, positions = chart.vertex_ids >= 0, np.zeros((int(chart.vertex_ids.max()) + 1, 3))
-    positions[chart.vertex_ids[inner]] = chart.vertices[inner]
+    positions = _of_surface(chart)
     pair = np.sort(side[graph.joined], axis=1)
     length = np.where(pair[:, 0] != pair[:, 1], edge_lengths(positions, graph.ends), 0.0)
     outline = np.bincount(pair.ravel(), np.repeat(length, 2), len(flat))
@@ -325,33 +338,6 @@ def slits(
         found.append(edges)
         start = np.union1d(start, edges)
     return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
-
-
-def pieces_of_band(uv: np.ndarray, side: float, share: float = 1.0) -> int:
-    """In how many pieces a chart with map uv (n,2) is to be cut across, next to a square with such a side, of which it
-    fills a share: 1 where it is no band."""
-    centred = uv - uv.mean(axis=0)
-    width, length = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
-    narrow = COMPACT if share < SMALL else LONG_AND_NARROW
-    longest = (narrow if width <= NARROW * length else LONG) * side
-    return min(int(np.ceil(length / (PIECE * side))), MOST_PIECES) if length > longest else 1
-
-
-def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The piece (m,) of every triangle where a long chart with map uv (n,2) is cut across in `count` of about the same
-    length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
-    graph = PolygonGraph.of(chart)
-    middle = graph.places(chart, uv)
-    middle -= graph.area @ middle / graph.area.sum()
-    along = middle @ np.linalg.eigh(middle.T @ (graph.area[:, None] * middle))[1][:, 1]
-    along = (along - along.min()) / max(np.ptp(along), 1e-300)
-    capacity, cut = capacities(graph.prices(chart, cost)), np.zeros(len(graph.joined), dtype=bool)
-    for k in range(1, count):
-        before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
-        if before.any() and after.any():
-            side = minimum_cut(graph, capacity, np.flatnonzero(before), np.flatnonzero(after))
-            cut |= graph.around(side)
-    return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 
 
 def capacities(price: np.ndarray) -> np.ndarray:

@@ -228,6 +228,25 @@ def test_the_number_of_segments_of_an_arc_does_not_make_it_a_bevel():
     assert counts[0] == counts[1] == 5
 
 
+def barrel(waist, slope, sectors):
+    """Two cones that meet in a crease, between level ends: an edge around the ends folds by 90 degrees - slope."""
+    c, s = np.cos(np.radians(slope)), np.sin(np.radians(slope))
+    V, Q = turned([(waist - s, 0.0), (waist, c), (waist - s, 2 * c)], sectors)
+    ends = [np.stack([np.arange(sectors) * 3 + j, (np.arange(sectors) + 1) % sectors * 3 + j], axis=1) for j in (0, 2)]
+    fans = [np.column_stack([e if j else e[:, ::-1], np.full(sectors, len(V) + j)]) for j, e in enumerate(ends)]
+    walls = Q[np.arange(len(Q)) % 3 < 2]
+    return np.concatenate([V, [[0, 0, 0], [0, 0, 2 * c]]]), np.concatenate([triangles_of(walls), *fans])
+
+
+def test_a_body_of_few_sides_that_unroll_comes_apart_though_some_meet_bluntly():
+    """Two cones and two ends: along the middle, four tenths of all edges, they meet at 44 degrees."""
+    component = component_of(*barrel(2.0, 22, 32))
+    side = sides(component, borders(component))
+    assert side.max() + 1 == 4
+    # Where a handful of sides are many, as those of a tube, or none unrolls, nothing does.
+    assert not borders(component_of(*barrel(2.0, 22, 8))).any()
+
+
 @pytest.mark.parametrize(
     "mesh", [meshes.icosphere(0), meshes.icosphere(1), meshes.icosphere(3), meshes.torus(24, 8), meshes.head()]
 )

@@ -111,22 +111,28 @@ def test_pairs_of_points_and_what_they_lie_in_are_all_found(seed):
     assert {*zip(point.tolist(), triangle.tolist(), strict=True)} == {*map(tuple, np.argwhere(inside).tolist())}
 
 
-def gear(teeth, width=0.4):
-    """A disk with teeth, drawn out: two flat sides with long outlines, and a band of walls between."""
+def gear(teeth, width=0.4, bevel=0.0):
+    """A disk with teeth, drawn out: two flat sides with long outlines, and a band of walls between, or two that lean by
+    a bevel where that is not 0."""
     angle = np.linspace(0, 2 * np.pi, 4 * teeth, endpoint=False)
     radius = np.where(np.arange(4 * teeth) % 4 < 2, 1.0, 0.75)
     outline = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-    n = len(outline)
-    points = [np.column_stack([outline, np.full(n, z)]) for z in (0.0, width)]
-    walls = [(k, (k + 1) % n, (k + 1) % n + n, k + n) for k in range(n)]
-    below = [((k + 1) % n, k, 2 * n) for k in range(n)]
-    above = [(k + n, (k + 1) % n + n, 2 * n + 1) for k in range(n)]
+    n, levels = len(outline), [(0.0, 1.0), (width, 1.0)]
+    if bevel:
+        levels = [(0.0, 1 - bevel), (width / 2, 1.0), (width, 1 - bevel)]
+    points = [np.column_stack([scale * outline, np.full(n, z)]) for z, scale in levels]
+    top = len(levels) * n
+    walls = [(j + k, j + (k + 1) % n, j + n + (k + 1) % n, j + n + k) for j in range(0, top - n, n) for k in range(n)]
+    below = [((k + 1) % n, k, top) for k in range(n)]
+    above = [(top - n + k, top - n + (k + 1) % n, top + 1) for k in range(n)]
     return np.concatenate([*points, [[0, 0, 0], [0, 0, width]]]), [*walls, *below, *above]
 
 
-def test_the_flat_sides_of_a_gear_are_islands_without_shear():
+@pytest.mark.parametrize("bound", [1.2, 2.0])
+def test_the_flat_sides_of_a_gear_are_islands_without_shear(bound):
+    """Whether one chart would keep the bound, as it does the second, or not."""
     surface = meshes.polygon_surface(*gear(20))
-    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.2)))
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=bound)))
     # Both sides, and the band of the teeth in pieces.
     assert [len(np.unique(c.faces)) for c in found.charts].count(80) == 2
     assert 3 <= len(found.charts) <= 8 and not found.warnings
@@ -147,6 +153,15 @@ def test_flat_sides_are_cut_around_and_nothing_else(turn):
     edges = flat_sides(chart)
     both = np.concatenate([np.column_stack([np.arange(n), np.roll(np.arange(n), -1)]) + k * n for k in range(2)])
     assert {*map(tuple, np.sort(edges, axis=1).tolist())} == {*map(tuple, np.sort(both, axis=1).tolist())}
+
+
+@pytest.mark.parametrize(("width", "bevel", "sharp"), [(0.4, 0.0, True), (0.4, 0.1, True), (0.1, 0.25, False)])
+def test_a_side_between_blunt_edges_is_none_between_sharp_ones(width, bevel, sharp):
+    surface = replace(meshes.polygon_surface(*gear(8, width, bevel)), seams=np.array([[0, 1], [1, 2]]))
+    (chart,) = strict_charts(surface)
+    both = flat_sides(chart)
+    assert len(both) == 2 * 32
+    assert len(flat_sides(chart, sharp=True)) == sharp * len(both)
 
 
 def two_sides(cells, turned):

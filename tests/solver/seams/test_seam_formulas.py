@@ -138,7 +138,7 @@ def test_bands_are_told_by_how_long_they_are(turn):
 
     def pieces(length, width, share=0.4):
         x, y = np.meshgrid(np.linspace(0, length, 41), np.linspace(0, width, 11))
-        return parting.pieces_of_band(np.column_stack([x.ravel(), y.ravel()]) @ rotation + 3, 1.0, share)
+        return limbs.pieces_of_band(np.column_stack([x.ravel(), y.ravel()]) @ rotation + 3, 1.0, share)
 
     assert pieces(1.79, 0.3) == 1 and pieces(1.81, 0.3) == 2
     # What is little of the surface is not to make the rest small.
@@ -146,7 +146,7 @@ def test_bands_are_told_by_how_long_they_are(turn):
     assert pieces(2.4001, 0.3) == 3 and pieces(2.399, 0.3) == 2
     # What is wider than a third of its length has to be longer.
     assert pieces(2.9, 1.2) == 1 and pieces(3.01, 1.2) == 3
-    assert pieces(100, 1) == parting.MOST_PIECES
+    assert pieces(100, 1) == limbs.MOST_PIECES
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])
@@ -154,10 +154,10 @@ def test_long_charts_are_cut_across_in_about_equal_pieces(count):
     V, F = meshes.grid(30, 3, width=10.0, height=1.0)
     (chart,) = strict_charts(triangle_surface(V, F))
     uv = chart.vertices[:, :2]
-    piece, edges = parting.in_pieces(chart, uv, np.ones(len(uv)), count)
+    piece, edges = limbs.in_pieces(chart, uv, np.ones(len(uv)), count)
     assert len(np.unique(piece)) == count
     area = np.bincount(piece, face_areas(chart.vertices, chart.triangles))
-    assert np.abs(area / area.mean() - 1).max() <= 2 * parting.NEAR_CUT + 0.05
+    assert np.abs(area / area.mean() - 1).max() <= 2 * limbs.NEAR_CUT + 0.05
     # The shortest way across is straight: three sides for each.
     assert len(edges) == 3 * (count - 1)
     for k in range(count):
