@@ -16,7 +16,7 @@ from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
-from ..mesh.topology import graph_components, pair_keys, paired
+from ..mesh.topology import graph_components, halfedges, pair_keys, paired
 from .component import SMOOTH, CutComponent, make_component
 from .cut_graph import cut_classes
 from .developable_nets import BENT, HARD, MUCH, defects, net
@@ -31,7 +31,7 @@ TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
 # whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of so many sides
 # that nearly all unroll, or half where nearly all borders are hard: low ones of animals are folded everywhere, into
-# small sides and bluntly. Of so few sides, as bodies of few polygons have, fewer borders need be hard.
+# small sides and bluntly. Of so few sides, as bodies of few polygons have, half of the borders do.
 LARGE = 0.03
 MOSTLY = 0.7
 HALF = 0.5
@@ -39,7 +39,8 @@ SHARP = 0.8
 ALL = 0.95
 MOST_SIDES = 2_000
 FEW_SIDES = 64
-KEEN = 0.45
+# A side is a ribbon with less of the area of a disk that has as long an outline.
+NARROW = 0.2
 # A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
 # would have to be longer or shorter by the second share, and is shorter than the third: where a hole is countersunk.
 COMPACT = 0.3
@@ -136,8 +137,6 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     few = len(area) <= MOST_SIDES
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
     unrolled = area[unrolls].sum() >= ALL * area.sum()
-    # A body of few polygons is made of few sides that unroll; those of tubes are all blunt.
-    sure |= unrolled and mostly >= MOSTLY and len(area) <= FEW_SIDES and keen >= KEEN
     if not sure and not (few and unrolled):
         return None
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
@@ -145,11 +144,25 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     whole = _without_strained(component, whole, fold, large[side], curvature)
     inside = np.bincount(whole, large[side]) > 0
     border = whole[joined[:, 0]] != whole[joined[:, 1]]
-    # What is folded everywhere into sides that unroll is hard, too, if it is where bands have joined these.
-    if not sure and length[border & (fold > HARD)].sum() < SHARP * length[border].sum():
+    # What is folded everywhere into sides that unroll is hard, too, if it is where bands have joined these; and a body
+    # of few polygons is made of few sides, but for tubes, which are made of ribbons.
+    sure |= length[border & (fold > HARD)].sum() >= SHARP * length[border].sum()
+    if not sure and (mostly < MOSTLY or len(area) > FEW_SIDES or keen < HALF or _ribbons(component, whole, border)):
         return None
     flat = _inner_curvature(component, whole, border, curvature, len(inside)) <= ROUND
     return whole, np.where(inside, np.bincount(whole, (unrolls & large)[side]) > 0, flat)
+
+
+def _ribbons(component: CutComponent, side: np.ndarray, border: np.ndarray) -> bool:
+    """Whether most of a component is sides (m,) that are long and narrow, between borders (e,) bool."""
+    count = int(side.max()) + 1
+    area = np.bincount(side, face_areas(component.positions, component.triangles), count)
+    one, other = component.pair[border].T // 3
+    tail, head = halfedges(component.triangles)
+    ends = component.positions[np.stack([tail, head])[:, component.boundary]]
+    outline = sum(np.bincount(side[k], component.length[border], count) for k in (one, other))
+    outline += np.bincount(side[component.boundary // 3], np.linalg.norm(ends[1] - ends[0], axis=1), count)
+    return bool(area[4 * np.pi * area < NARROW * outline**2].sum() > HALF * area.sum())
 
 
 def _tight(component: CutComponent, fold: np.ndarray) -> np.ndarray:

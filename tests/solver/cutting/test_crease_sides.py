@@ -243,8 +243,14 @@ def test_a_body_of_few_sides_that_unroll_comes_apart_though_some_meet_bluntly():
     component = component_of(*barrel(2.0, 22, 32))
     side = sides(component, borders(component))
     assert side.max() + 1 == 4
-    # Where a handful of sides are many, as those of a tube, or none unrolls, nothing does.
-    assert not borders(component_of(*barrel(2.0, 22, 8))).any()
+
+
+@pytest.mark.parametrize(("height", "ribbons"), [(8.0, False), (15.0, True)])
+def test_a_tube_of_ribbons_stays_whole(height, ribbons):
+    """Sides that meet at 80 and at 40 degrees in turn, each 1 wide: about half of their borders are hard."""
+    way = np.radians([0, 80, 120, 200, 240, 320])
+    V, F = prism(np.column_stack([np.cos(way), np.sin(way)]).cumsum(axis=0), height)
+    assert (hard_sides(component_of(V, F)) is None) == ribbons
 
 
 @pytest.mark.parametrize(
