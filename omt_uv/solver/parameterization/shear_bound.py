@@ -142,7 +142,8 @@ def _first_round(
     """Charts and maps as they are; if boundaries are free, those come apart around large flat sides between sharp edges
     where that takes most of what they are sheared away: a blade shows it although its chart keeps the bound."""
     first = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory)
-    if not free or search.target is not None:  # A density asked for shears what is flat.
+    kept_free = search.cutting.get("avoid") is not None
+    if not free or kept_free or search.target is not None:  # A density asked for shears what is flat.
         return first
     from ..seams.parting import flat_sides
 

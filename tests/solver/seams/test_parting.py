@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.symmetry_plane import MirrorImages
+from omt_uv.solver.cutting import cuts
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.overlap import cover_pairs, overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
@@ -139,6 +140,32 @@ def test_the_flat_sides_of_a_gear_are_islands_without_shear(bound):
     for chart, one in zip(found.charts, found.maps, strict=True):
         figures = distortion(chart.vertices, chart.triangles, one.uv[chart.triangles], polygons=chart.faces)
         assert figures.angle_mean == pytest.approx(1, abs=1e-3) and figures.folds == 0 and figures.overlap == 0
+
+
+def top_of(teeth):
+    """The vertices around the upper side of a gear."""
+    return np.arange(4 * teeth, 8 * teeth)
+
+
+def test_flat_sides_come_off_a_body_that_is_round_otherwise_though_it_keeps_the_bound(monkeypatch):
+    """A gear that is not taken for a hard body, nor has a net, as it would not with a round handle."""
+    monkeypatch.setattr(cuts, "net", lambda component: None)
+    monkeypatch.setattr(cuts, "hard_borders", lambda surface, gluing, positions, gone, wants: np.zeros_like(gone))
+    surface = meshes.polygon_surface(*gear(4))
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.6)))
+    assert np.isin(found.seams, top_of(4)).all(axis=1).sum() >= 16
+    assert all(one.angle_mean == pytest.approx(1, abs=1e-3) for one in found.maps)
+
+
+def test_flat_sides_stay_where_their_outline_is_to_be_kept_free():
+    points, polygons = gear(4)
+    avoid = np.zeros(len(points))
+    avoid[top_of(4)] = 1
+    surface, options = meshes.polygon_surface(points, polygons), UnwrapOptions(max_shear=1.6)
+    found = drain(unwrap(surface, options=options, avoid=avoid))
+    assert not np.isin(found.seams, top_of(4)).all(axis=1).any()
+    everywhere = drain(unwrap(surface, options=options))
+    assert np.isin(everywhere.seams, top_of(4)).all(axis=1).sum() == 16
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0])
