@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
 
 from .blas_threads import one_blas_thread
+from .freed_memory import keep_freed
 
 T = TypeVar("T")
 
@@ -50,6 +51,7 @@ Steps: TypeAlias = Generator[Progress, None, T]
 
 def drain(steps: Steps[T], callback: Callable[[Progress], None] | None = None) -> T:
     """Run a solver to its end and return its result; `callback` sees every Progress."""
+    keep_freed()
     with one_blas_thread():
         while True:
             try:
@@ -95,6 +97,7 @@ def on_thread(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
     results: list[T] = []
     errors: list[BaseException] = []
     closed, done = threading.Event(), threading.Event()
+    keep_freed()
 
     def work() -> None:
         try:
