@@ -6,16 +6,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import Elements
 from ..maps.tutte import arc_length_parameters, evened_tutte, released_vertices, tutte
 from ..transport.convex_domain import Domain
 from ..transport.inverse_map import corner_parameters
 
 
-def mean_value_sites(vertices, triangles, loop, corners, domain: Domain) -> np.ndarray:
-    """A milder embedding (n,2) than a conformal map, with the boundary spread by its length (Floater 2003)."""
-    order, places = _spread(vertices, loop, corners, domain)
-    return tutte(vertices, triangles, order, places)
+def mean_value_sites(
+    vertices, triangles, loop, corners, domain: Domain, order: np.ndarray | None = None
+) -> np.ndarray:
+    """A milder embedding (n,2) than a conformal map, with the boundary spread by its length (Floater 2003); order (n,):
+    see `nested_dissection.mesh_order`."""
+    outline, places = _spread(vertices, loop, corners, domain)
+    return tutte(vertices, triangles, outline, places, order=order)
 
 
 def evened_sites(
@@ -37,13 +41,14 @@ def evened_sites(
     PrecisionError : weights so far from one another that double precision has no such map
     """
     loop, corners, domain = outline
-    order, places = _spread(vertices, loop, corners, domain)
+    loop, places = _spread(vertices, loop, corners, domain)
     if corners is not None:
-        corner = np.isin(order, corners)
-        kept = ~released_vertices(faces.triangles, order, np.cumsum(corner) - 1, corner, len(vertices))
-        order, places = order[kept], places[kept]
-    sites = tutte(vertices, faces.triangles, order, places)
-    return evened_tutte(vertices, order, sites, faces, area_weight, most)
+        corner = np.isin(loop, corners)
+        kept = ~released_vertices(faces.triangles, loop, np.cumsum(corner) - 1, corner, len(vertices))
+        loop, places = loop[kept], places[kept]
+    order = mesh_order(vertices, faces.triangles)
+    sites = tutte(vertices, faces.triangles, loop, places, order=order)
+    return evened_tutte(vertices, loop, sites, faces, area_weight, most, order)
 
 
 def _spread(vertices: np.ndarray, loop: np.ndarray, corners: np.ndarray | None, domain: Domain):

@@ -43,8 +43,11 @@ class FlatDisk:
         return float(share @ (beyond - share @ beyond) ** 2)
 
 
-def boundary_first(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> FlatDisk:
-    """Flatten a disk (n,3), (m,3) with its boundary loop (b,), in the unit of the vertices.
+def boundary_first(
+    vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray, order: np.ndarray | None = None
+) -> FlatDisk:
+    """Flatten a disk (n,3), (m,3) with its boundary loop (b,), in the unit of the vertices; order (n,): see
+    `nested_dissection.mesh_order`.
 
     Raises
     ------
@@ -60,14 +63,15 @@ def boundary_first(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray
     curvature = angle_defects(triangles, angles_from_lengths(length), loop, n)
     inside = np.ones(n, bool)
     inside[loop] = False
-    rows = laplacian[inside]
+    inner = np.flatnonzero(inside) if order is None else order[inside[order]]
+    rows = laplacian[inner]
     uv, log_scale = np.zeros((n, 2)), np.zeros(n)
-    factor = Factor(rows[:, inside].tocsc()) if inside.any() else None
+    factor = Factor(rows[:, inner].tocsc(), None if order is None else "natural") if len(inner) else None
     if factor is not None:
-        log_scale[inside] = factor.solve(-curvature[inside])
+        log_scale[inner] = factor.solve(-curvature[inner])
     uv[loop] = _closed_curve(vertices[loop], curvature[loop] + laplacian[loop] @ log_scale)
     if factor is not None:
-        uv[inside] = factor.solve(-(rows[:, loop] @ uv[loop]))
+        uv[inner] = factor.solve(-(rows[:, loop] @ uv[loop]))
     return FlatDisk(uv, log_scale, vertex_areas(vertices, triangles))
 
 

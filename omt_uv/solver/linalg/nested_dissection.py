@@ -8,7 +8,7 @@ large meshes that is faster than a minimum degree order, and so are its factors,
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import csc_matrix
 
 from ..mesh.topology import expand, halfedges
 from .sparse import minimum_degree
@@ -55,10 +55,11 @@ def mesh_order(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return Dissection(points).order(*halfedges(triangles))
 
 
-def vertex_graph(triangles: np.ndarray, n: int) -> coo_matrix:
-    """Which of n vertices share a triangle (m,3), themselves included: (n,n), entries positive."""
-    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
-    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
+def vertex_graph(triangles: np.ndarray, n: int) -> csc_matrix:
+    """Which of n vertices share a triangle (m,3), and every one itself: (n,n), entries positive."""
+    (tail, head), every = halfedges(triangles), np.arange(n)
+    pairs = np.concatenate([tail, head, every]), np.concatenate([head, tail, every])
+    return csc_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
 def _upper_half(points: np.ndarray, part: np.ndarray, count: int) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 
 from ..errors import FoldedUVError, PrecisionError
-from ..linalg.nested_dissection import LARGE, Dissection, mesh_order
+from ..linalg.nested_dissection import LARGE, mesh_order
 from ..linalg.sparse import Factor, solve_general
 from ..mesh.geometry import angles_from_lengths, halfedge_lengths
 from ..mesh.topology import halfedges, twins
@@ -41,40 +41,54 @@ def mean_value_weights(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tutte(
-    positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, boundary: np.ndarray, equal: bool = False
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    loop: np.ndarray,
+    boundary: np.ndarray,
+    equal: bool = False,
+    order: np.ndarray | None = None,
 ) -> np.ndarray:
     """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2); equal: with
-    the weights of equilateral triangles in place of the mesh's own."""
+    the weights of equilateral triangles in place of the mesh's own; order (n,): see `nested_dissection.mesh_order`."""
     n = len(positions)
-    weight = _weights(positions, triangles, equal)
     inside = np.ones(n, dtype=bool)
     inside[loop] = False
+    if order is None and n >= LARGE:
+        order = mesh_order(positions, triangles)
+    inner = np.flatnonzero(inside) if order is None else order[inside[order]]
     uv = np.zeros((n, 2))
     uv[loop] = boundary
-    if inside.any():
-        rows = weight[inside]
+    if len(inner):
+        rows = _weights(positions, triangles, equal)[inner]
         total = np.asarray(rows.sum(axis=1)).ravel()
         rows = csr_matrix((rows.data / np.repeat(total, np.diff(rows.indptr)), rows.indices, rows.indptr), rows.shape)
-        matrix = csr_matrix((np.ones(inside.sum()), (np.arange(inside.sum()),) * 2)) - rows[:, inside]
-        order = "mmd" if n < LARGE else _inner_order(positions, triangles, inside)
-        uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ boundary, order)
+        matrix = csr_matrix((np.ones(len(inner)), (np.arange(len(inner)),) * 2)) - rows[:, inner]
+        as_they_come = "mmd" if order is None else "natural"
+        uv[inner] = solve_general(matrix.tocsc(), rows[:, loop] @ boundary, as_they_come)
     return uv
 
 
 def evened_tutte(
-    positions: np.ndarray, loop: np.ndarray, uv: np.ndarray, faces: Elements, area_weight: float, most: float = np.inf
+    positions: np.ndarray,
+    loop: np.ndarray,
+    uv: np.ndarray,
+    faces: Elements,
+    area_weight: float,
+    most: float = np.inf,
+    order: np.ndarray | None = None,
 ) -> np.ndarray | None:
     """An embedding (n,2) of a disk mesh (n,3) of less energy than one by `tutte`, uv (n,2), with its boundary, the loop
     (b,); None where that does not come down to `most`.
 
-    faces : elements of the mesh, with the areas it is to have; area_weight : in the energy that counts
+    faces : elements of the mesh, with the areas it is to have; area_weight : in the energy that counts; order (n,) :
+        see `nested_dissection.mesh_order`
 
     In every round the pull of a vertex on its neighbours is divided by how much the map has to be stretched there:
     first by lengths, then by areas, which draws no slivers (Yoshizawa, Belyaev, Seidel 2004, A fast and simple
     stretch-minimizing mesh parameterization). The map of the least energy is taken.
     """
     n, triangles = len(positions), faces.triangles
-    order = mesh_order(positions, triangles)
+    order = mesh_order(positions, triangles) if order is None else order
     inner = order[~np.isin(order, loop)]
     rows = _weights(positions, triangles)[inner]
     inside, outside = rows[:, inner], rows[:, loop]
@@ -181,12 +195,6 @@ def _weights(positions: np.ndarray, triangles: np.ndarray, equal: bool = False) 
     tail, head = halfedges(triangles)
     rows, columns = np.concatenate([tail, head]), np.concatenate([head, tail])
     return csr_matrix((np.concatenate([at_tail.ravel(), at_head.ravel()]), (rows, columns)), shape=(n, n))
-
-
-def _inner_order(positions: np.ndarray, triangles: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Elimination order of the vertices `inside` (n,) bool, numbered among themselves."""
-    order = Dissection(positions).order(*halfedges(triangles))
-    return (np.cumsum(inside) - 1)[order[inside[order]]]
 
 
 def arc_length_parameters(positions: np.ndarray, loop: np.ndarray) -> np.ndarray:

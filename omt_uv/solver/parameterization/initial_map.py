@@ -18,6 +18,7 @@ from ..canonical.embeddings import evened_sites, mean_value_sites
 from ..conformal.boundary_first import FlatDisk, boundary_first
 from ..errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from ..freed_memory import give_back_of
+from ..linalg.nested_dissection import mesh_order
 from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
@@ -128,7 +129,12 @@ class DiskMesh:
     @cached_property
     def embedded(self) -> np.ndarray:
         """A mean value map (n,2) to the unit disk."""
-        return mean_value_sites(self.vertices, self.triangles, self.loop, None, Disk())
+        return mean_value_sites(self.vertices, self.triangles, self.loop, None, Disk(), self.order)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """In which vertices (n,) are eliminated."""
+        return mesh_order(self.vertices, self.triangles)
 
     @cached_property
     def is_far(self) -> bool:
@@ -139,7 +145,7 @@ class DiskMesh:
     def flat(self) -> FlatDisk | None:
         """The disk flattened with the boundary as it comes; None where double precision has no such map."""
         try:
-            return boundary_first(self.vertices, self.triangles, self.loop)
+            return boundary_first(self.vertices, self.triangles, self.loop, self.order)
         except PrecisionError:
             return None
 
@@ -313,7 +319,7 @@ def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
         if flat is not None:
             return InitialChartMap(flat)
         try:
-            evened = evened_tutte(disk.vertices, disk.loop, disk.embedded, faces, SMOOTH_WEIGHT, ROOM)
+            evened = evened_tutte(disk.vertices, disk.loop, disk.embedded, faces, SMOOTH_WEIGHT, ROOM, disk.order)
         except PrecisionError:
             return None
         if evened is not None and n > COARSE_ABOVE:
