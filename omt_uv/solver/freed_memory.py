@@ -20,7 +20,8 @@ MANY = 100_000
 KEPT = 1 << 28
 OF_THESE = 1 << 25
 # Numbers by which mallopt knows them (malloc.h).
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+M_TRIM_THRESHOLD = -1
+M_MMAP_THRESHOLD = -3
 
 
 @cache

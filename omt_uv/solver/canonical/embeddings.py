@@ -13,9 +13,7 @@ from ..transport.convex_domain import Domain
 from ..transport.inverse_map import corner_parameters
 
 
-def mean_value_sites(
-    vertices, triangles, loop, corners, domain: Domain, order: np.ndarray | None = None
-) -> np.ndarray:
+def mean_value_sites(vertices, triangles, loop, corners, domain: Domain, order: np.ndarray | None = None) -> np.ndarray:
     """A milder embedding (n,2) than a conformal map, with the boundary spread by its length (Floater 2003); order (n,):
     see `nested_dissection.mesh_order`."""
     outline, places = _spread(vertices, loop, corners, domain)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.geometry import face_areas, signed_areas
+from .contacts import covers_itself, touches_itself
 from .energy import elements, energy
 from .tutte import arc_length_parameters, tutte
 
@@ -19,6 +20,12 @@ USABLE = 100.0
 def count_folds(uv: np.ndarray, triangles: np.ndarray) -> int:
     """Number of faces (m,3) of a map (n,2) that are not counter-clockwise."""
     return int((~(signed_areas(uv, triangles) > 0)).sum())
+
+
+def is_one_to_one(uv: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> bool:
+    """Whether no face (m,3) of a map uv (n,2) folds, it does not cover itself, nor its boundary (b,) lie on itself."""
+    apart = count_folds(uv, triangles) == 0 and not touches_itself(uv, loop)
+    return apart and not covers_itself(uv @ [1, 1j], loop)
 
 
 def untangle(

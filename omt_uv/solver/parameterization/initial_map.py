@@ -23,7 +23,7 @@ from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
 from ..maps.tutte import evened_tutte
-from ..maps.untangle import count_folds, map_energy
+from ..maps.untangle import is_one_to_one, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
@@ -179,7 +179,7 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
     """
     with log.timed("flattening"):
         flat = _evenly_flattened(disk, spread)
-        if flat is None or _one_to_one(disk, flat):
+        if flat is None or is_one_to_one(flat, disk.triangles, disk.loop):
             return None if flat is None else InitialChartMap(flat)
         return InitialChartMap(disk.embedded)
 
@@ -188,12 +188,6 @@ def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
     """A disk flattened (n,2) with the boundary as it comes; None where that scales unevenly."""
     mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
     return disk.flat.uv if disk.flat is not None and disk.flat.spread(mass) < spread else None
-
-
-def _one_to_one(disk: DiskMesh, uv: np.ndarray) -> bool:
-    """Whether no face of a map uv (n,2) folds, it does not cover itself, nor its boundary lie on itself."""
-    apart = count_folds(uv, disk.triangles) == 0 and not touches_itself(uv, disk.loop)
-    return apart and not covers_itself(uv @ [1, 1j], disk.loop)
 
 
 def coarse_initial_map(
@@ -273,7 +267,7 @@ def _even_start(disk: DiskMesh, flat: np.ndarray) -> np.ndarray | None:
     if map_energy(flat, disk.vertices, disk.triangles) < HOPELESS:
         return None
     even = _evenly_flattened(disk, LITTLE_SPREAD)
-    return even if even is not None and _one_to_one(disk, even) else None
+    return even if even is not None and is_one_to_one(even, disk.triangles, disk.loop) else None
 
 
 def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, quality: str) -> Steps[Refinement]:
@@ -330,7 +324,7 @@ def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
 def _roomy_flat(disk: DiskMesh, faces: Elements) -> np.ndarray | None:
     """A disk flattened (n,2) that scales evenly, is one to one, and not squeezed; None where that is not so."""
     flat = _evenly_flattened(disk, LITTLE_SPREAD)
-    if flat is None or not _one_to_one(disk, flat):
+    if flat is None or not is_one_to_one(flat, disk.triangles, disk.loop):
         return None
     w = flat @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())

@@ -30,9 +30,11 @@ from .continuation_rules import (
     UNSQUEEZED,
     Quality,
     first_pressure,
+    has_kept,
     is_ahead,
     is_enough,
     is_futile,
+    is_nearly_settled,
     is_out_of_reach,
     is_settled,
     is_squeezed,
@@ -170,8 +172,8 @@ def minimise_in_stages(
         if problem.smoother is not None:
             w = problem.smoother.smoothed(newton.faces, w, weight, FIRST_SWEEPS)
         limits = _limits(problem, balance, quality, k - len(weights) + 1, quality.max_steps - steps)
-        if k == 0 and squeezed:
-            limits = replace(limits, relaxed=UNSQUEEZED, shear=None)
+        if squeezed or prolonged:
+            limits = _limits_after(limits, k == 0 and squeezed)
         forbidden = None if with_barrier or overlap else problem.boundary_crosses
         stage = yield from minimise(newton, w, limits, k, forbidden)
         w, steps = stage.w, steps + stage.steps
@@ -240,7 +242,9 @@ def _first_weights(
 
 def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, steps_left: int) -> StageLimits:
     """Limits of a stage; ahead: less than 0 while planned weights are still to come."""
-    on_the_way, swept = ahead < 0, problem.smoother is not None
+    on_the_way, swept, region = ahead < 0, problem.smoother is not None, problem.faces.region is not None
+    # Maps on the way to others say what those will be: they go as far as they promise.
+    expecting = balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED
     tolerance, loose = stage_tolerances(quality, balance, on_the_way, not problem.scale_free, swept)
     return StageLimits(
         area_error=np.inf if on_the_way else quality.area_error,
@@ -248,13 +252,20 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         tolerance=tolerance,
         loose_tolerance=loose,
         # Its share is what a stage with a region is for.
-        foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
+        foreseeing=balance == 0 and not on_the_way and not region,
         foreseen=FORESEEN,
-        # Maps on the way to others say what those will be: they go as far as they promise.
-        expecting=balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED,
-        pressure=first_pressure(quality, balance, not problem.scale_free and problem.faces.region is None),
+        expecting=expecting,
+        passing=expecting and on_the_way and not region,
+        pressure=first_pressure(quality, balance, not problem.scale_free and not region),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
+
+
+def _limits_after(limits: StageLimits, relaxing: bool) -> StageLimits:
+    """Limits after a start that was squeezed, which has far to go, or came from a coarser mesh, which has the shear
+    that stages on the way would bring; relaxing : in the first stage of the former."""
+    limits = replace(limits, passing=False)
+    return replace(limits, relaxed=UNSQUEEZED, shear=None) if relaxing else limits
 
 
 def _shear_of(faces: Elements) -> Callable[[np.ndarray], float]:
@@ -268,9 +279,9 @@ class StageLimits:
     area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
     the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
-    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; shear : of a
-    map, with which it ends where that settles, see `continuation_rules.is_settled`; pressure : of the first step, see
-    `continuation_rules.FIRST_PRESSURE`
+    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; passing : it
+    ends with a step that `continuation_rules.has_kept`; shear : of a map, with which it ends where that settles, see
+    `continuation_rules.is_settled`; pressure : of the first step, see `continuation_rules.FIRST_PRESSURE`
     """
 
     area_error: float
@@ -281,6 +292,7 @@ class StageLimits:
     foreseeing: bool = False
     foreseen: float = 0.0
     expecting: bool = False
+    passing: bool = False
     shear: Callable[[np.ndarray], float] | None = None
     pressure: float = FIRST_PRESSURE
 
@@ -338,13 +350,14 @@ def minimise(
         if forbidden is not None and forbidden(step.w):
             return StageResult(w, steps + 1, residual, value, "crossed", ahead=step.w)
         gained = step.share, value - step.energy, step.decrement
-        pressure = float(next_pressure(used, *gained))
+        pressure, kept = float(next_pressure(used, *gained)), bool(has_kept(*gained))
         w, value, steps = step.w, step.energy, steps + 1
         residual = float(promised(step.decrement, value))
         left = float(left_over(value, *gained)) if limits.expecting else residual
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
-        met = value < limits.relaxed or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
+        met = value < limits.relaxed or (limits.passing and kept)
+        met = met or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
         nearly = residual < max(limits.foreseen, limits.loose_tolerance) or left < limits.loose_tolerance
         # Limbs on a sphere trade their areas late: there only the last steps tell.
         if limits.foreseeing and not met and (nearly or limits.expecting):
@@ -353,6 +366,7 @@ def minimise(
         if limits.shear is not None and not met:
             last, figures = figures, (limits.shear(w), problem.area_error(w))
             met = bool(is_settled(step.share, figures, last, limits.area_error))
+            met = met or bool(is_nearly_settled(kept and limits.expecting, figures, last, limits.area_error))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

@@ -5,14 +5,15 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
 
     start a stage            `planned_weights`, `spare_weight`, `is_squeezed`, `is_ahead`, `next_weight`
     within a stage           `first_pressure`, `next_pressure`
-    end a stage              `stage_tolerances`, `left_over`, `judge_step`, `is_out_of_reach`, `is_settled`
+    end a stage              `stage_tolerances`, `left_over`, `judge_step`, `has_kept`, `is_out_of_reach`,
+                             `is_settled`, `is_nearly_settled`
     end the refinement       `is_enough`, `is_futile`
 
-A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, nor one by what is `left_over`,
-that `is_settled` or `is_out_of_reach`, since its steps are those of all charts. It does not tell `is_futile` of
-regions: a chart with a region that has no exact areas uses up its steps, is given back, and says alone what it did not
-reach. It knows no barrier and no sweeps, and gives a chart back that would need them. It relaxes a squeezed start to
-the end, not to UNSQUEEZED. And it starts cold.
+A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, nor one by what it `has_kept`,
+what is `left_over`, that `is_settled`, `is_nearly_settled` or `is_out_of_reach`, since its steps are those of all
+charts. It does not tell `is_futile` of regions: a chart with a region that has no exact areas uses up its steps, is
+given back, and says alone what it did not reach. It knows no barrier and no sweeps, and gives a chart back that would
+need them. It relaxes a squeezed start to the end, not to UNSQUEEZED. And it starts cold.
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ FORESEEN = 0.05
 # less than this share of the goal.
 SETTLED = 0.02
 SETTLED_AREAS = 0.1
+# The same, whatever became of the areas, where it has kept its promise as well: what it changes by shrinks with the
+# square then.
+NEARLY_SETTLED = 0.08
 # The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less. Share
 # of the energy where the goal is not reached, where it is, and on the way.
 SWEPT_TOLERANCE = 0.1
@@ -227,12 +231,18 @@ def next_pressure(pressure: Number, share: Number, gain: Number, decrement: Numb
 
     share: of the step that was taken; gain: by how much the energy fell; decrement: by how much it was to fall
     """
-    full = (share == 1) & (gain > KEPT_PROMISE * decrement)
+    full = has_kept(share, gain, decrement)
     poor = (share < POOR_SHARE) | (gain < POOR_PROMISE * decrement)
     more = np.minimum(1.0, np.maximum(3 * pressure, 3 * LEAST_PRESSURE))
     true = (gain > TRUE_PROMISE[0] * decrement) & (gain < TRUE_PROMISE[1] * decrement)
     less = np.where(pressure > LEAST_PRESSURE, pressure / np.where(true, PRESSURE_DROPS, PRESSURE_FALLS), 0.0)
     return np.where(full, less, np.where(share == 0, 1.0, np.where(poor, more, pressure)))
+
+
+def has_kept(share: Number, gain: Number, decrement: Number) -> Truth:
+    """Whether a step was a full one and kept its promise; share, gain, decrement: as in `next_pressure`. With a free
+    boundary a stage on the way ends there: the next one, which starts as near to its own end, takes no more steps."""
+    return (share == 1) & (gain > KEPT_PROMISE * decrement)
 
 
 def stage_tolerances(
@@ -285,6 +295,12 @@ def is_settled(share: Number, now: tuple[Number, Number], before: tuple[Number, 
     (shear, error), (last_shear, last_error) = now, before
     same = (np.abs(shear - last_shear) <= SETTLED * last_shear) & (np.abs(error - last_error) <= SETTLED_AREAS * goal)
     return (share == 1) & (error <= goal) & same
+
+
+def is_nearly_settled(kept: Truth, now: tuple[Number, Number], before: tuple[Number, Number], goal: Number) -> Truth:
+    """Whether a step that has kept its promise changed the shear by so little that the next one will not be seen, with
+    an area error at its goal; now, before: shear and area error."""
+    return kept & (now[1] <= goal) & (np.abs(now[0] - before[0]) <= NEARLY_SETTLED * now[0])
 
 
 def is_enough(quality: Quality, balance: float, error: Number, weight: Number) -> Truth:

@@ -269,10 +269,10 @@ def test_halves_are_eliminated_before_what_separates_them():
                 assert rank[separator].min() > rank[rest].max()
 
 
-def test_the_graph_joins_just_what_shares_a_triangle():
+def test_the_graph_joins_just_what_shares_a_triangle_and_every_vertex_to_itself():
     V, F = meshes.bumpy(5, 4)
     found = vertex_graph(F, len(V) + 1).toarray() > 0
-    expected = np.zeros_like(found)
+    expected = np.eye(len(V) + 1) > 0
     for f in F:
         expected[np.ix_(f, f)] = True
     np.testing.assert_array_equal(found, expected)

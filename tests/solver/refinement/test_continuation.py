@@ -52,6 +52,13 @@ def test_an_exact_step_is_the_only_one_but_for_the_proof():
     assert stage.status == "converged" and stage.steps == 2 and not stage.w.any()
 
 
+def test_a_stage_that_passes_needs_no_proof():
+    """One full step that has kept its promise is enough on the way; one that was cut short is not."""
+    passing = StageLimits(np.inf, 50, passing=True)
+    assert drain(minimise(Parabola(), np.ones(3), passing)).steps == 1
+    assert drain(minimise(Parabola((0.5,)), np.ones(3), passing)).steps > 1
+
+
 def test_a_stage_ends_when_its_steps_are_used_up_or_help_no_more():
     assert drain(minimise(Parabola((0.01,)), np.ones(3), StageLimits(0.1, 5))).status == "steps"
     stalled = drain(minimise(Parabola((0.0,)), np.ones(3), StageLimits(0.1, 50)))

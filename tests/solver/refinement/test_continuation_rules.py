@@ -114,6 +114,23 @@ def test_a_goal_is_out_of_reach_where_steps_gain_less_than_is_missing():
     assert not rules.is_out_of_reach(0.5, np.inf, 0.008)
 
 
+def test_what_has_kept_its_promise_is_nearly_settled_with_any_areas_at_the_goal():
+    goal, before = 0.008, (0.300, 0.02)
+    for shear in (0.28, 0.32):
+        assert rules.is_nearly_settled(True, (shear, 0.0079), before, goal)
+        assert not rules.is_nearly_settled(False, (shear, 0.0079), before, goal)
+        assert not rules.is_nearly_settled(True, (shear, 0.0081), before, goal)
+    assert not rules.is_nearly_settled(True, (0.25, 0.001), before, goal)
+    assert not rules.is_nearly_settled(True, (0.3, 0.001), (np.inf, np.inf), goal)
+
+
+def test_a_full_step_alone_has_kept_its_promise():
+    kept = each(rules.has_kept, SHARE, GAIN, DECREMENT)
+    np.testing.assert_array_equal(rules.has_kept(SHARE, GAIN, DECREMENT), kept)
+    assert not np.asarray(kept)[SHARE < 1].any()
+    assert rules.has_kept(1.0, 0.8, 1.0) and not rules.has_kept(1.0, 0.6, 1.0) and not rules.has_kept(0.99, 1.0, 1.0)
+
+
 def test_a_map_is_settled_where_a_whole_step_changes_neither_shear_nor_areas():
     goal = 0.008
     assert rules.is_settled(1.0, (0.300, 0.0051), (0.302, 0.0053), goal)
