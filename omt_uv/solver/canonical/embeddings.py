@@ -4,6 +4,8 @@ Seidel 2004), with its boundary spread along that of the domain by its length.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..linalg.nested_dissection import mesh_order
@@ -26,9 +28,10 @@ def evened_sites(
     outline: tuple[np.ndarray, np.ndarray | None, Domain],
     area_weight: float,
     most: float,
+    patient: Callable[[], bool] = lambda: False,
 ) -> np.ndarray | None:
     """An embedding (n,2) of a disk mesh (n,3) that gives every triangle room, by weights that are evened; None where
-    its energy at this area weight does not come down to `most`, see `tutte.evened_tutte`.
+    its energy at this area weight does not come down to `most`. patient : see `tutte.evened_tutte`.
 
     outline : the boundary (b,), corners (4,) or None, and the domain. A face with three vertices on one side of a
         rectangle has no area: one of these leaves the side.
@@ -46,7 +49,7 @@ def evened_sites(
         loop, places = loop[kept], places[kept]
     order = mesh_order(vertices, faces.triangles)
     sites = tutte(vertices, faces.triangles, loop, places, order=order)
-    return evened_tutte(vertices, loop, sites, faces, area_weight, most, order)
+    return evened_tutte(vertices, loop, sites, faces, area_weight, most, order, patient)
 
 
 def _spread(vertices: np.ndarray, loop: np.ndarray, corners: np.ndarray | None, domain: Domain):

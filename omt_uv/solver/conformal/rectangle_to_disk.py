@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import PrecisionError
+from ..mesh.geometry import halfedge_lengths
 
 # Longer side over shorter: the image of a longer rectangle has its ends squeezed below double precision.
 MAX_ASPECT = 8.0
 MAX_ROUNDS = 1000  # of Moebius maps, when a disk is centred
+# A mean this near to the middle of the unit disk is there.
+CENTRED = 1e-3
 
 
 def rectangle_to_disk(points: np.ndarray, height: float) -> np.ndarray:
@@ -57,3 +60,18 @@ def centre_in_disk(points: np.ndarray, mass: np.ndarray, tolerance: float = 1e-1
             break
         z = (z - mean) / (1 - np.conj(mean) * z)
     return np.stack([z.real, z.imag], axis=1)
+
+
+def centred_sites(
+    sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: np.ndarray, least: float
+) -> np.ndarray:
+    """Sites (n,2) of a mesh (m,3) in the disk, its loop (b,) on the circle, moved by a Moebius map so that what has
+    most mass (n,) is in the middle, if neighbours stay farther apart than `least`.
+
+    The transport then has less to move, and a magnified region meets the circle on all sides at once.
+    """
+    if np.linalg.norm(mass @ sites) < CENTRED * mass.sum():
+        return sites
+    centred = centre_in_disk(sites, mass)
+    centred[loop] /= np.linalg.norm(centred[loop], axis=1)[:, None]
+    return centred if halfedge_lengths(centred, triangles).min() >= least else sites

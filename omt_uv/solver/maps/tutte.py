@@ -5,6 +5,8 @@ Any positive weights do. Where they squeeze a vertex, its neighbours let it go (
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
@@ -19,6 +21,9 @@ from .energy import Elements, energies_of, squared
 # takes a third of the time of a Newton step.
 ROUNDS = 6
 WORTHWHILE = 0.3
+# The same where a transport, or the map of a coarser mesh, would be the start otherwise, which take longer.
+MORE_ROUNDS = 12
+WELCOME = 0.1
 
 # Sides that are shorter than this share of the mean get so much of a convex boundary: faces between vertices that
 # nearly coincide would fold by rounding.
@@ -76,12 +81,13 @@ def evened_tutte(
     area_weight: float,
     most: float = np.inf,
     order: np.ndarray | None = None,
+    patient: Callable[[], bool] = lambda: False,
 ) -> np.ndarray | None:
     """An embedding (n,2) of a disk mesh (n,3) of less energy than one by `tutte`, uv (n,2), with its boundary, the loop
     (b,); None where that does not come down to `most`.
 
     faces : elements of the mesh, with the areas it is to have; area_weight : in the energy that counts; order (n,) :
-        see `nested_dissection.mesh_order`
+        see `nested_dissection.mesh_order`; patient : says, once `most` is near and rounds win little, whether to go on
 
     In every round the pull of a vertex on its neighbours is divided by how much the map has to be stretched there:
     first by lengths, then by areas, which draws no slivers (Yoshizawa, Belyaev, Seidel 2004, A fast and simple
@@ -93,17 +99,14 @@ def evened_tutte(
     rows = _weights(positions, triangles)[inner]
     inside, outside = rows[:, inner], rows[:, loop]
     best, least, uv = uv, np.inf, uv.copy()
-    for k in range(ROUNDS):
+    for k in range(MORE_ROUNDS):
         a, b = faces.derivatives(uv @ [1, 1j])
         scale = np.sqrt((faces.area @ faces.ratio) / float(faces.area @ faces.sums(np.abs(squared(a) - squared(b)))))
         a, b = scale * a, scale * b
         before, value = least, float(energies_of(faces, a, b, area_weight).sum())
         if value < least:
             best, least = uv.copy(), value
-        if not value < (1 - WORTHWHILE) * before or not len(inner):
-            break
-        # Lengths are evened once: only what areas win foretells what they will.
-        if k > 1 and value * (value / before) ** (ROUNDS - 1 - k) > most:
+        if not len(inner) or not _goes_on(k, value, before, most, patient):
             break
         kept = np.sqrt(_growth(faces, a, b, n) if k else 1 / _stretch(faces, a, b, n))
         for part, columns in ((inside, inner), (outside, loop)):
@@ -113,6 +116,19 @@ def evened_tutte(
         except PrecisionError:
             break
     return best if least <= most else None
+
+
+def _goes_on(k: int, value: float, before: float, most: float, patient: Callable[[], bool]) -> bool:
+    """Whether weights are evened once more after k rounds that left the energy `value`, which one less had `before`."""
+    won = value / before
+
+    def comes_down(rounds: int) -> bool:
+        # Lengths are evened once: only what areas win foretells what they will.
+        return k < rounds - 1 and (k < 2 or value * won ** (rounds - 1 - k) <= most)
+
+    if won < 1 - WORTHWHILE and comes_down(ROUNDS):
+        return True
+    return value > most and won < 1 - WELCOME and comes_down(MORE_ROUNDS) and patient()
 
 
 def _weighted(inside: csr_matrix, outside: csr_matrix, boundary: np.ndarray) -> np.ndarray:

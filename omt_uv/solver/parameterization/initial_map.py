@@ -49,8 +49,6 @@ SMOOTHING = (0.9, 0.1)
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
-# A mean this near to the middle of the unit disk is there.
-CENTRED = 1e-3
 # Charts with more vertices than this come by way of a coarser one.
 COARSE_ABOVE = 5000
 # Up to so many come without one where their boundary is free and what they are flattened or evened to has room: that
@@ -184,6 +182,11 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
         return InitialChartMap(disk.embedded)
 
 
+def _sprawls(disk: DiskMesh) -> bool:
+    """Whether no map of a disk is nearly an isometry: of others a start that is sheared keeps some of its shear."""
+    return _evenly_flattened(disk, LITTLE_SPREAD) is None
+
+
 def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
     """A disk flattened (n,2) with the boundary as it comes; None where that scales unevenly."""
     mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
@@ -313,7 +316,8 @@ def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
         if flat is not None:
             return InitialChartMap(flat)
         try:
-            evened = evened_tutte(disk.vertices, disk.loop, disk.embedded, faces, SMOOTH_WEIGHT, ROOM, disk.order)
+            given = (faces, SMOOTH_WEIGHT, ROOM, disk.order, lambda: _sprawls(disk))
+            evened = evened_tutte(disk.vertices, disk.loop, disk.embedded, *given)
         except PrecisionError:
             return None
         if evened is not None and n > COARSE_ABOVE:
@@ -338,7 +342,7 @@ def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
         return None
     faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
     with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
-        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, ROOM)
+        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, ROOM, lambda: _sprawls(disk))
         return None if evened is None else InitialChartMap(evened)
     return None
 
@@ -382,13 +386,14 @@ def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
 
     Where rounding decides where the points of the conformal map lie, a mean value map is moved instead.
     """
+    from ..conformal.rectangle_to_disk import centred_sites
     from ..transport.inverse_map import centroid_map
 
     vertices, triangles, loop, corners, domain = disk.vertices, disk.triangles, disk.loop, disk.corners, disk.domain
     mass = np.bincount(triangles.ravel(), np.repeat(disk.target / 3, 3), len(vertices))
     conformal, sites, trouble = yield from _conformal_sites(disk, log)
     if not trouble:
-        sites = _centred(sites, mass, triangles, loop) if corners is None else sites
+        sites = centred_sites(sites, mass, triangles, loop, SITE_RESOLUTION) if corners is None else sites
         cells, trouble = yield from _transport(sites, mass, domain, log)
         if cells is not None:
             return InitialChartMap(
@@ -423,20 +428,6 @@ def _conformal_sites(disk: DiskMesh, log: RunLog):
             trouble = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
             return conformal, None, trouble
         return conformal, sites, ""
-
-
-def _centred(sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Sites (n,2) of the disk moved by a Moebius map so that what has most mass is in the middle, if they stay apart.
-
-    The transport then has less to move, and a magnified region meets the circle on all sides at once.
-    """
-    if np.linalg.norm(mass @ sites) < CENTRED * mass.sum():
-        return sites
-    from ..conformal.rectangle_to_disk import centre_in_disk
-
-    centred = centre_in_disk(sites, mass)
-    centred[loop] /= np.linalg.norm(centred[loop], axis=1)[:, None]
-    return centred if halfedge_lengths(centred, triangles).min() >= SITE_RESOLUTION else sites
 
 
 def _transport(sites, mass, domain: Domain, log: RunLog):

@@ -344,13 +344,13 @@ def minimise(
     """
     value = problem.energy(w)
     steps, residual, status, pressure = 0, np.inf, "steps", limits.pressure
-    error, figures = np.inf, (np.inf, np.inf)
+    error, figures, kept = np.inf, (np.inf, np.inf), False
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
             return StageResult(w, steps + 1, residual, value, "crossed", ahead=step.w)
         gained = step.share, value - step.energy, step.decrement
-        pressure, kept = float(next_pressure(used, *gained)), bool(has_kept(*gained))
+        pressure, twice, kept = float(next_pressure(used, *gained)), kept, bool(has_kept(*gained))
         w, value, steps = step.w, step.energy, steps + 1
         residual = float(promised(step.decrement, value))
         left = float(left_over(value, *gained)) if limits.expecting else residual
@@ -366,7 +366,7 @@ def minimise(
         if limits.shear is not None and not met:
             last, figures = figures, (limits.shear(w), problem.area_error(w))
             met = bool(is_settled(step.share, figures, last, limits.area_error))
-            met = met or bool(is_nearly_settled(kept and limits.expecting, figures, last, limits.area_error))
+            met = met or bool(is_nearly_settled(kept and twice and limits.expecting, figures, last, limits.area_error))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

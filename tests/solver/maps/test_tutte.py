@@ -57,6 +57,41 @@ def test_maps_that_keep_too_much_energy_are_none():
     np.testing.assert_array_equal(start, given)
 
 
+def test_who_is_patient_gets_what_more_rounds_win_and_is_asked_for_nothing_else():
+    V, F = meshes.head(24)
+    loop = boundary_loops(F)[0]
+    faces = elements(V, F, face_areas(V, F))
+    start = tutte(V, F, loop, circle(V, loop))
+    asked: list[bool] = []
+
+    def patient(answer):
+        asked.append(answer)
+        return answer
+
+    def energy_of(uv):
+        root = np.sqrt(face_areas(V, F).sum() / signed_areas(uv, F).sum())
+        return energy(faces, root * (uv @ [1, 1j]), 30.0)
+
+    plain = evened_tutte(V, loop, start, faces, 30.0)
+    assert not asked
+    most = 0.999 * energy_of(plain)
+    assert evened_tutte(V, loop, start, faces, 30.0, most, None, lambda: patient(False)) is None
+    assert asked == [False]
+    more = evened_tutte(V, loop, start, faces, 30.0, most, None, lambda: patient(True))
+    assert energy_of(more) <= most and (signed_areas(more, F) > 0).all()
+    np.testing.assert_array_equal(evened_tutte(V, loop, start, faces, 30.0, np.inf, None, lambda: patient(True)), plain)
+
+
+@pytest.mark.parametrize("mesh", [meshes.bumpy(), meshes.head(24)])
+def test_an_order_that_is_given_changes_no_map(mesh):
+    V, F = mesh
+    loop, order = boundary_loops(F)[0], np.random.default_rng(0).permutation(len(V))
+    faces, start = elements(V, F, face_areas(V, F)), tutte(V, F, loop, circle(V, loop))
+    np.testing.assert_allclose(tutte(V, F, loop, circle(V, loop), order=order), start, atol=1e-9)
+    again = evened_tutte(V, loop, start, faces, 30.0, np.inf, order)
+    np.testing.assert_allclose(again, evened_tutte(V, loop, start, faces, 30.0), atol=1e-9)
+
+
 def test_what_is_flat_comes_back():
     """Mean value coordinates are exact on linear functions."""
     V, F = meshes.random_disk(height=0.0)
