@@ -81,16 +81,26 @@ def _ancestors(before: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         found, jump = more, jump[jump]
 
 
-def shorten(component: CutComponent, cut: np.ndarray, tips: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
+def shorten(
+    component: CutComponent,
+    cut: np.ndarray,
+    tips: np.ndarray,
+    around: np.ndarray | None = None,
+    tried: set[bytes] | None = None,
+) -> np.ndarray:
     """The cut (e,) bool with each stretch replaced by the shortest path that does the same; `tips` (k,) stay on it.
 
     Without one stretch the open component is an annulus. The shortest path between its two boundaries may take off
     anywhere along them, so stretches branch off one another where that is shorter. `around` (e,) bool confines this
-    to stretches that touch these edges, once.
+    to stretches that touch these edges, once. tried : stretches of this cut, with these tips, that nothing shorter
+    replaces, and in the end those of the cut that is returned
     """
+    tried = set() if tried is None else tried
     for _ in range(SWEEPS if around is None else 1):
         before = float(component.cost[cut].sum())
         for stretch in stretches(component, cut, tips)[:MOST_STRETCHES]:
+            if stretch.tobytes() in tried:
+                continue
             if not _is_stretch(component, cut, stretch) or not _touches(component, stretch, around):
                 continue
             rest = cut.copy()
@@ -100,6 +110,9 @@ def shorten(component: CutComponent, cut: np.ndarray, tips: np.ndarray, around: 
             if path is not None and component.cost[path].sum() < length * (1 - 1e-9):
                 cut = rest
                 cut[path] = True
+                tried.clear()
+            else:
+                tried.add(stretch.tobytes())
         if component.cost[cut].sum() >= before * (1 - 1e-3):
             break
     return cut

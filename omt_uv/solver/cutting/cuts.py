@@ -407,8 +407,9 @@ def _plain_cut(component: CutComponent, topology: Topology, k: int, extremities:
         chosen = _best_root(component)
     else:
         chosen = greedy_arcs(component, tips)
+    tried: set[bytes] = set()
     if topology.handles[k]:
-        chosen = shorten(component, chosen, tips)
+        chosen = shorten(component, chosen, tips, tried=tried)
     while len(tips) < extremities:
         scale = log_scale(component, chosen)
         if spread(component, scale) <= BEARABLE:
@@ -417,8 +418,9 @@ def _plain_cut(component: CutComponent, topology: Topology, k: int, extremities:
         far = edge_distance(component, _cut_vertices(component, chosen))
         tips = np.append(tips, peak(scale * far * component.tip_factor()))
         path = path_to(component, _cut_vertices(component, chosen), tips[-1])
-        chosen = shorten(component, chosen | path, tips, around=path)
-    chosen = shorten(component, chosen, tips)
+        tried.clear()
+        chosen = shorten(component, chosen | path, tips, around=path, tried=tried)
+    chosen = shorten(component, chosen, tips, tried=tried)
     if extremities and topology.handles[k] == 0 and 2 < len(tips) + topology.boundaries[k] <= MOST_ENDS:
         chosen = min(chosen, branching_tree(component, tips), key=lambda edges: component.cost[edges].sum())
     return chosen, tips
