@@ -7,9 +7,12 @@ k + (L u), and closes after the least change of its lengths. Both coordinates ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_matrix, identity
 
 from ..linalg.sparse import Factor
 from ..mesh.geometry import (
@@ -20,6 +23,13 @@ from ..mesh.geometry import (
     laplacian_from_lengths,
     vertex_areas,
 )
+
+# Added to the diagonal, relative to its mean: log scales that their flux determines may all grow by the same.
+SHIFT = 1e-10
+# Of the share that a disk is bent by until it does not cover itself.
+HALVINGS = 5
+# The greatest log scale of a side: the products of lengths stay far from what double precision ends at.
+MOST_SCALE = 50.0
 
 
 @dataclass(frozen=True)
@@ -32,6 +42,7 @@ class FlatDisk:
     uv: np.ndarray
     log_scale: np.ndarray
     area: np.ndarray
+    system: HarmonicSystem = field(repr=False, compare=False)
 
     def spread(self, asked: np.ndarray) -> float:
         """Mean square over the surface of the log scale, beyond half the log of the areas asked for (n,) over its own.
@@ -41,6 +52,61 @@ class FlatDisk:
         share = self.area / self.area.sum()
         beyond = self.log_scale - 0.5 * np.log(asked / self.area)
         return float(share @ (beyond - share @ beyond) ** 2)
+
+    def bent(self, share: float) -> np.ndarray:
+        """The disk (n,2), almost conformal as well, with a boundary that turns by this share of what it turns by here,
+        and for the rest as evenly as a circle: with 0 it is convex, and what covers itself here comes apart before."""
+        system = self.system
+        turn = share * system.turn + (1 - share) * system.even_turn
+        return system.inside_of(_closed_curve(system.side * np.exp((1 - share) * system.even_scale), turn))
+
+    def bent_until(self, is_apart: Callable[[np.ndarray], bool]) -> np.ndarray | None:
+        """The disk (n,2), bent as little as makes this true; None where no bent one does."""
+        found, share = None, 0.0
+        for k in range(1, HALVINGS + 1):
+            uv = self.bent(share + 0.5**k)
+            if is_apart(uv):
+                found, share = uv, share + 0.5**k
+        return found
+
+
+@dataclass(frozen=True)
+class HarmonicSystem:
+    """What flat maps of one disk have in common: laplacian (n,n), the factors of its part inside, the vertices there
+    (i,), in the order of their elimination, and all (n,) in theirs; the loop (b,) with its sides (b,), from each vertex
+    to the next, and the turns (b,) of the map whose log scale is 0 there."""
+
+    laplacian: csr_matrix
+    factor: Factor | None
+    inner: np.ndarray
+    order: np.ndarray | None
+    loop: np.ndarray
+    side: np.ndarray
+    turn: np.ndarray
+
+    def inside_of(self, boundary: np.ndarray) -> np.ndarray:
+        """The harmonic map (n,2) with this boundary (b,2)."""
+        uv = np.zeros((self.laplacian.shape[0], 2))
+        uv[self.loop] = boundary
+        if self.factor is not None:
+            uv[self.inner] = self.factor.solve(-(self.laplacian[self.inner][:, self.loop] @ boundary))
+        return uv
+
+    @property
+    def even_turn(self) -> np.ndarray:
+        """The turns (b,) of a circle, in proportion to the sides."""
+        return np.pi * (self.side + np.roll(self.side, 1)) / self.side.sum()
+
+    @cached_property
+    def even_scale(self) -> np.ndarray:
+        """The log scale (b,) of the sides of the map that turns evenly: turns are the flux of log scales."""
+        n = self.laplacian.shape[0]
+        flux = np.zeros(n)
+        flux[self.loop] = self.even_turn - self.turn
+        shift = SHIFT * float(self.laplacian.diagonal().mean())
+        scale = Factor(self.laplacian + shift * identity(n), self.order).solve(flux)[self.loop]
+        scale = (scale + np.roll(scale, -1)) / 2
+        return np.clip(scale - scale.mean(), -MOST_SCALE, MOST_SCALE)
 
 
 def boundary_first(
@@ -64,21 +130,20 @@ def boundary_first(
     inside = np.ones(n, bool)
     inside[loop] = False
     inner = np.flatnonzero(inside) if order is None else order[inside[order]]
-    rows = laplacian[inner]
-    uv, log_scale = np.zeros((n, 2)), np.zeros(n)
-    factor = Factor(rows[:, inner].tocsc(), None if order is None else "natural") if len(inner) else None
+    within = laplacian[inner][:, inner].tocsc()
+    log_scale = np.zeros(n)
+    factor = Factor(within, None if order is None else "natural") if len(inner) else None
     if factor is not None:
         log_scale[inner] = factor.solve(-curvature[inner])
-    uv[loop] = _closed_curve(vertices[loop], curvature[loop] + laplacian[loop] @ log_scale)
-    if factor is not None:
-        uv[inner] = factor.solve(-(rows[:, loop] @ uv[loop]))
-    return FlatDisk(uv, log_scale, vertex_areas(vertices, triangles))
+    side = np.linalg.norm(np.roll(vertices[loop], -1, axis=0) - vertices[loop], axis=1)
+    turn = curvature[loop] + laplacian[loop] @ log_scale
+    system = HarmonicSystem(laplacian, factor, inner, order, loop, side, turn)
+    return FlatDisk(system.inside_of(_closed_curve(side, turn)), log_scale, vertex_areas(vertices, triangles), system)
 
 
-def _closed_curve(points: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Corners (b,2) of a closed polygon that turns by these angles (b,), with the sides of points (b,3), but for what
-    closes it."""
-    side = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+def _closed_curve(side: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Corners (b,2) of a closed polygon that turns by these angles (b,), with these sides (b,), but for what closes
+    it."""
     heading = np.cumsum(turn) - turn[0]
     direction = np.stack([np.cos(heading), np.sin(heading)])
     # The change of lengths that closes it, least in the squares over the lengths.

@@ -171,7 +171,7 @@ class InitialChartMap:
 
 
 def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
-    """A disk flattened with the boundary as it comes, or a mean value map where that would fold or cover itself.
+    """A disk flattened with the boundary as it comes, bent where that would cover itself, or a mean value map.
 
     None where it would scale unevenly: areas are farther from a mean value map than from the transport's, then.
     """
@@ -179,7 +179,16 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
         flat = _evenly_flattened(disk, spread)
         if flat is None or is_one_to_one(flat, disk.triangles, disk.loop):
             return None if flat is None else InitialChartMap(flat)
-        return InitialChartMap(disk.embedded)
+        bent = None if len(disk.vertices) <= EVENED_ABOVE else _bent(disk)
+        return InitialChartMap(disk.embedded if bent is None else bent)
+
+
+def _bent(disk: DiskMesh) -> np.ndarray | None:
+    """A disk (n,2) flattened and bent until it does not cover itself; None where double precision has no such map."""
+    with suppress(PrecisionError):
+        if disk.flat is not None:
+            return disk.flat.bent_until(lambda uv: is_one_to_one(uv, disk.triangles, disk.loop))
+    return None
 
 
 def _sprawls(disk: DiskMesh) -> bool:
@@ -328,7 +337,7 @@ def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
 def _roomy_flat(disk: DiskMesh, faces: Elements) -> np.ndarray | None:
     """A disk flattened (n,2) that scales evenly, is one to one, and not squeezed; None where that is not so."""
     flat = _evenly_flattened(disk, LITTLE_SPREAD)
-    if flat is None or not is_one_to_one(flat, disk.triangles, disk.loop):
+    if flat is None or not (is_one_to_one(flat, disk.triangles, disk.loop) or (flat := _bent(disk)) is not None):
         return None
     w = flat @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())

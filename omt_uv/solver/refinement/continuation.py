@@ -228,7 +228,8 @@ def _first_weights(
         return [NEAR * weight for weight in weights[1:]], False
     least = weights[0]
     first = problem.newton_problem(w, least, False).energy(w)
-    if is_squeezed(first, least):
+    # What has little shear has nothing to relax.
+    if is_squeezed(first, least) and problem.newton_problem(w, 0.0, False).energy(w) > UNSQUEEZED:
         return [SQUEEZED_WEIGHT, *weights], True
     if prolonged and balance == 0 and len(weights) > 1:
         second = problem.newton_problem(w, weights[1], False).energy(w)

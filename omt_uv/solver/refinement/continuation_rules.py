@@ -13,7 +13,7 @@ A batch differs from a chart by itself in five ways. It takes no `early` end of 
 what is `left_over`, that `is_settled`, `is_nearly_settled` or `is_out_of_reach`, since its steps are those of all
 charts. It does not tell `is_futile` of regions: a chart with a region that has no exact areas uses up its steps, is
 given back, and says alone what it did not reach. It knows no barrier and no sweeps, and gives a chart back that would
-need them. It relaxes a squeezed start to the end, not to UNSQUEEZED. And it starts cold.
+need them. It relaxes a squeezed start to the end, not to UNSQUEEZED, whatever its shear. And it starts cold.
 """
 
 from __future__ import annotations

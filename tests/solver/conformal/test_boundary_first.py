@@ -4,6 +4,7 @@ import meshes
 import numpy as np
 
 from omt_uv.solver.conformal.boundary_first import boundary_first
+from omt_uv.solver.maps.contacts import covers_itself
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.untangle import count_folds
 from omt_uv.solver.mesh.geometry import vertex_areas
@@ -46,3 +47,50 @@ def test_moving_and_turning_the_surface_changes_no_shape():
     V, F = meshes.bumpy(8, 8, height=0.3)
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     np.testing.assert_allclose(flattened(V @ turn + 5, F).uv, flattened(V, F).uv, atol=1e-9)
+
+
+def test_what_is_bent_by_all_of_its_turns_is_the_flat_map_and_by_none_is_convex():
+    V, F = meshes.head(24)
+    flat, loop = flattened(V, F), boundary_loops(F)[0]
+    whole = flat.bent(1.0)
+    np.testing.assert_allclose(fitted(whole, flat.uv), flat.uv, atol=1e-9 * np.ptp(flat.uv))
+    side = np.diff(np.append(flat.bent(0.0)[loop], flat.bent(0.0)[loop[:1]], axis=0), axis=0) @ [1, 1j]
+    turn = np.angle(np.roll(side, -1) / side)
+    assert (turn > 0).all() and abs(turn.sum() - 2 * np.pi) < 1e-9
+
+
+def test_a_strip_that_covers_itself_comes_apart_where_it_is_bent():
+    """Wound round a cylinder by more than a turn in its own plane, as a spring that is pressed flat."""
+    V, F = meshes.bumpy(120, 4, height=0.0)
+    x, y = V[:, 0] - V[:, 0].min(), V[:, 1]
+    turn, r = 2.6 * np.pi * x / np.ptp(x), 1 + 0.1 * (y - y.mean()) / np.ptp(y)
+    V = np.column_stack([r * np.cos(turn), r * np.sin(turn), 0.02 * turn])
+    flat, loop = flattened(V, F), boundary_loops(F)[0]
+    assert covers_itself(flat.uv @ [1, 1j], loop)
+    asked: list[bool] = []
+
+    def is_apart(uv):
+        asked.append(not covers_itself(uv @ [1, 1j], loop))
+        return asked[-1]
+
+    apart = flat.bent_until(is_apart)
+    assert any(asked) and not covers_itself(apart @ [1, 1j], loop) and count_folds(apart, F) == 0
+    assert flat.bent_until(lambda uv: False) is None
+    # Hardly any shear, as in every conformal map.
+    assert distortion(V, F, apart[F], overlap=False).angle_mean < 1.1
+
+
+def test_bent_maps_turn_with_the_surface_and_grow_with_it():
+    V, F = meshes.head(16)
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    one, other = flattened(V, F).bent(0.5), flattened(3 * V @ turn.T + 5, F).bent(0.5)
+    np.testing.assert_allclose(fitted(other, one), one, atol=1e-6 * np.ptp(one))
+
+
+def fitted(uv, other):
+    """The map uv (n,2) moved, turned and scaled to where the other one is."""
+    a, b = (x @ [1, 1j] for x in (uv, other))
+    a, middle = a - a.mean(), b.mean()
+    w = middle + a * (np.vdot(a, b - middle) / np.vdot(a, a))
+    return np.column_stack([w.real, w.imag])
