@@ -247,6 +247,7 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
     # Maps on the way to others say what those will be: they go as far as they promise.
     expecting = balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED
     tolerance, loose = stage_tolerances(quality, balance, on_the_way, not problem.scale_free, swept)
+    brisk = expecting and quality.tolerance >= LOOSE
     return StageLimits(
         area_error=np.inf if on_the_way else quality.area_error,
         max_steps=min(steps_left, STAGE_STEPS) if balance == 0 else steps_left,
@@ -256,7 +257,8 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         foreseeing=balance == 0 and not on_the_way and not region,
         foreseen=FORESEEN,
         expecting=expecting,
-        passing=expecting and on_the_way and not region,
+        passing=brisk and on_the_way and not region,
+        brisk=brisk,
         pressure=first_pressure(quality, balance, not problem.scale_free and not region),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
@@ -281,8 +283,10 @@ class StageLimits:
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
     the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
     expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; passing : it
-    ends with a step that `continuation_rules.has_kept`; shear : of a map, with which it ends where that settles, see
-    `continuation_rules.is_settled`; pressure : of the first step, see `continuation_rules.FIRST_PRESSURE`
+    ends with a step that `continuation_rules.has_kept`; brisk : and with two that leave it nearly settled, see
+    `continuation_rules.is_nearly_settled`, where areas need not be exact; shear : of a map, with which it ends where
+    that settles, see `continuation_rules.is_settled`; pressure : of the first step, see
+    `continuation_rules.FIRST_PRESSURE`
     """
 
     area_error: float
@@ -294,6 +298,7 @@ class StageLimits:
     foreseen: float = 0.0
     expecting: bool = False
     passing: bool = False
+    brisk: bool = False
     shear: Callable[[np.ndarray], float] | None = None
     pressure: float = FIRST_PRESSURE
 
@@ -367,7 +372,7 @@ def minimise(
         if limits.shear is not None and not met:
             last, figures = figures, (limits.shear(w), problem.area_error(w))
             met = bool(is_settled(step.share, figures, last, limits.area_error))
-            met = met or bool(is_nearly_settled(kept and twice and limits.expecting, figures, last, limits.area_error))
+            met = met or bool(is_nearly_settled(kept and twice and limits.brisk, figures, last, limits.area_error))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

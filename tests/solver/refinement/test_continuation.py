@@ -59,6 +59,28 @@ def test_a_stage_that_passes_needs_no_proof():
     assert drain(minimise(Parabola((0.5,)), np.ones(3), passing)).steps > 1
 
 
+@dataclass(frozen=True)
+class Settling(Parabola):
+    """Halves what it is away at every step, as promised; the shear is what `sheared` says of it."""
+
+    def step(self, w, value, pressure):
+        after = w / 2
+        return NewtonStep(after, self.energy(after), value - self.energy(after), 1.0)
+
+
+def test_a_brisk_stage_ends_once_two_steps_kept_their_promise_and_shear_stays():
+    """The areas are at their goal from the first step on; the second one changes the shear by a fortieth."""
+
+    def sheared(w):
+        return 1 + 0.1 * float(np.abs(w).max())
+
+    def steps(**how):
+        limits = StageLimits(10.0, 50, tolerance=1e-9, loose_tolerance=1e-9, shear=sheared, **how)
+        return drain(minimise(Settling(), np.ones(3), limits)).steps
+
+    assert steps(brisk=True) == 2 < steps()
+
+
 def test_a_stage_ends_when_its_steps_are_used_up_or_help_no_more():
     assert drain(minimise(Parabola((0.01,)), np.ones(3), StageLimits(0.1, 5))).status == "steps"
     stalled = drain(minimise(Parabola((0.0,)), np.ones(3), StageLimits(0.1, 50)))
