@@ -309,7 +309,9 @@ class Round:
 
     def is_hardly_better(self, before: Round) -> bool:
         """Whether hardly more of it keeps the bound than before, and much does not."""
-        return self.excess > max((1 - LITTLE) * before.excess, NEARLY * self.bound)
+        missing, then = (float(each.area[each.searched].sum()) for each in (self, before))
+        is_as_much = self.excess > (1 - LITTLE) * before.excess and missing > (1 - LITTLE) * then
+        return is_as_much and self.excess > NEARLY * self.bound
 
 
 def pressing_shear(mean: float, steep: float, bound: float) -> float:

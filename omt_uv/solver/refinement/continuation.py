@@ -24,6 +24,8 @@ from .continuation_rules import (
     FORESEEN,
     LOOSE,
     NEAR,
+    NEAR_THE_END,
+    PASSED,
     PROMISED,
     SQUEEZED_WEIGHT,
     STAGE_STEPS,
@@ -362,7 +364,7 @@ def minimise(
         left = float(left_over(value, *gained)) if limits.expecting else residual
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
-        met = value < limits.relaxed or (limits.passing and kept)
+        met = value < limits.relaxed or (limits.passing and kept and residual < PASSED)
         met = met or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
         nearly = residual < max(limits.foreseen, limits.loose_tolerance) or left < limits.loose_tolerance
         # Limbs on a sphere trade their areas late: there only the last steps tell.
@@ -372,7 +374,8 @@ def minimise(
         if limits.shear is not None and not met:
             last, figures = figures, (limits.shear(w), problem.area_error(w))
             met = bool(is_settled(step.share, figures, last, limits.area_error))
-            met = met or bool(is_nearly_settled(kept and twice and limits.brisk, figures, last, limits.area_error))
+            near = kept and twice and limits.brisk and residual < NEAR_THE_END
+            met = met or bool(is_nearly_settled(near, figures, last, limits.area_error))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

@@ -43,6 +43,10 @@ SETTLED_AREAS = 0.1
 # The same, whatever became of the areas, where it has kept its promise as well: what it changes by shrinks with the
 # square then.
 NEARLY_SETTLED = 0.08
+# What a step promised, over the energy that it left, for a stage to be over with it: one on the way, and the last. What
+# promised more has only begun, as on a closed body with a short slit.
+PASSED = 4.0
+NEAR_THE_END = 0.5
 # The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less. Share
 # of the energy where the goal is not reached, where it is, and on the way.
 SWEPT_TOLERANCE = 0.1

@@ -310,6 +310,20 @@ def test_what_became_worse_stays_where_others_became_better():
     assert before.with_what_is_better(search, bad, set()) == (bad, set())
 
 
+@pytest.mark.parametrize(("area", "stuck"), [(1.0, True), (0.1, False)])
+def test_what_came_apart_is_not_stuck_where_a_small_part_misses_as_much(area, stuck):
+    """Of one chart that misses the bound by 0.05 a part is left that does, for the whole, by 0.049."""
+
+    def found(areas, means, missed):
+        areas, means = np.array(areas), np.array(means)
+        return shear_search.Round([None] * len(areas), [], None, {}, areas, means, means, 1.35, missed)
+
+    before = found([1.0], [1.4], [0])
+    now = found([1 - area, area], [1.1, 1.35 + 0.049 / area], [1])
+    assert now.is_hardly_better(before) == stuck
+    assert not found([1.0], [1.36], [0]).is_hardly_better(before)
+
+
 def made_round(search, edges, shear, found):
     """A round along edges (k,2), its charts mapped flat with such a shear."""
     surface = search.surface

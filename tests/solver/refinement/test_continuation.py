@@ -57,6 +57,8 @@ def test_a_stage_that_passes_needs_no_proof():
     passing = StageLimits(np.inf, 50, passing=True)
     assert drain(minimise(Parabola(), np.ones(3), passing)).steps == 1
     assert drain(minimise(Parabola((0.5,)), np.ones(3), passing)).steps > 1
+    # A promise of many times what is left tells of the way to go, and of nothing else.
+    assert drain(minimise(Parabola(), 2 * np.ones(3), passing)).steps > 1
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,12 @@ def test_a_brisk_stage_ends_once_two_steps_kept_their_promise_and_shear_stays():
         return drain(minimise(Settling(), np.ones(3), limits)).steps
 
     assert steps(brisk=True) == 2 < steps()
+
+
+def test_a_brisk_stage_does_not_end_far_from_its_end():
+    """The shear never changes, and areas are at their goal; what a step promises is three times what it leaves."""
+    limits = StageLimits(1e3, 50, tolerance=1e-9, loose_tolerance=1e-9, shear=lambda w: 1.0, brisk=True)
+    assert drain(minimise(Settling(), 1e3 * np.ones(3), limits)).steps > 2
 
 
 def test_a_stage_ends_when_its_steps_are_used_up_or_help_no_more():
