@@ -277,9 +277,9 @@ class SolverOperator:
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        return self.start(context)
+        return self.begin(context)
 
-    def start(self, context: bpy.types.Context) -> set[str]:
+    def begin(self, context: bpy.types.Context) -> set[str]:
         """Run the first slice, which is all for small meshes, and go on from a timer."""
         if run.current is not None:
             return tell(self, context, Complaint(f"{run.current.label} is still running. Wait, or cancel it by Esc."))

@@ -70,7 +70,7 @@ class UV_OT_omt_live(bpy.types.Operator):
             # The session sees it at its next tick, and ends.
             following.current.is_on = False
             return {"CANCELLED"}
-        state = self.start(context)
+        state = self.begin(context)
         if "RUNNING_MODAL" in state and not bpy.app.background:
             self._timer = context.window_manager.event_timer_add(0.02, window=context.window)
             context.window_manager.modal_handler_add(self)
@@ -79,13 +79,13 @@ class UV_OT_omt_live(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """For scripts and the redo panel: follow until nothing moves."""
         following.keep(context)
-        state = self.start(context)
+        state = self.begin(context)
         while "RUNNING_MODAL" in state:
             if not self._tick(context):
                 return self._end(context, {"FINISHED"})
         return state
 
-    def start(self, context: bpy.types.Context) -> set[str]:
+    def begin(self, context: bpy.types.Context) -> set[str]:
         from ..session.live import Session
 
         try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from types import SimpleNamespace
 
 import bpy
@@ -10,7 +9,9 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from mathutils import Matrix
 from sphere_shapes import blob
+from windows import Window, in_front
 
 NAMES = ["object.omt_flow", "uv.omt_flow"]
 # Places in pixels; those of a drag are a hundredth of a unit each.
@@ -75,15 +76,88 @@ def drag(request, monkeypatch):
         def hears(*event, **at):
             return operator.modal(context, mouse(*event, **at))
 
-        def cancel(context, cancelled=operator.cancel):
-            # What stands in is no instance of the class whose method goes on with its base's, last of all.
-            with suppress(TypeError):
-                cancelled(context)
-
-        operator.hears, operator.cancel = hears, cancel
+        operator.hears = hears
         return operator
 
     return objects, begin, request.param
+
+
+class View:
+    """A view from above of 200 by 100 pixels, of which 50 are a unit: what the region and the view say of themselves."""
+
+    width, height = 200, 100
+    type, is_perspective, view_perspective = "WINDOW", False, "ORTHO"
+    view_matrix = Matrix()
+    perspective_matrix = Matrix.Diagonal((1 / 2, 1 / 1, -1 / 100, 1))
+
+    @staticmethod
+    def pixel(point):
+        """Where a point of the world is seen."""
+        return (100 + 50 * point[0], 50 + 50 * point[1])
+
+    view2d = SimpleNamespace(region_to_view=lambda x, y: (x / 200, y / 100))
+
+
+def in_view(package, monkeypatch, area):
+    """A window whose mouse is over an area of this kind, seen from above."""
+    in_front(monkeypatch, package)
+    return Window(area, region=View, region_data=View)
+
+
+@pytest.mark.parametrize(("name", "area"), [("object.omt_flow", "VIEW_3D"), ("uv.omt_flow", "IMAGE_EDITOR")])
+@pytest.mark.parametrize("end", ["ESC", "keep"])
+def test_a_drag_begins_by_a_click_and_goes_with_the_mouse(package, monkeypatch, name, area, end):
+    objects = bodies()
+    window, before = in_view(package, monkeypatch, area), state(objects)
+    operator = scenes.stand_in(name, **({"result": "MESH"} if name == "object.omt_flow" else {"radius": 0.3}))
+    assert operator.invoke(window, mouse("LEFTMOUSE", "PRESS", (100, 50))) == {"RUNNING_MODAL"}
+    assert window.listeners == [operator] and not window.timers and "Esc: Back" in window.hints[-1]
+    operator.modal(window, mouse("LEFTMOUSE", "PRESS", (100, 50))) if name == "uv.omt_flow" else None
+    assert operator.modal(window, mouse("MOUSEMOVE", at=(110, 55))) == {"RUNNING_MODAL"}
+    # Ten pixels of two hundred of the UV square, and of fifty for a unit of the world.
+    expected = (0.2, 0.1, 0.0) if name == "object.omt_flow" else (0.05, 0.05)
+    assert tuple(operator.move) == pytest.approx(expected, abs=1e-6)
+    assert state(objects) != before and window.hints[-1] is not None
+    if name == "uv.omt_flow":
+        assert window.redrawn and tuple(operator.start) == pytest.approx((0.5, 0.5))
+    if end == "ESC":
+        assert operator.modal(window, mouse("ESC", "PRESS")) == {"CANCELLED"} and state(objects) == before
+    else:
+        release = ("LEFTMOUSE", "RELEASE") if name == "uv.omt_flow" else ("RET", "PRESS")
+        assert operator.modal(window, mouse(*release, at=(110, 55))) == {"FINISHED"} and state(objects) != before
+    assert window.hints[-1] is None and operator._drag is None
+
+
+@pytest.mark.parametrize(("name", "area", "settings"), [
+    ("object.omt_flow", "IMAGE_EDITOR", {"move": (0.0, 0.0, 0.25)}), ("uv.omt_flow", "VIEW_3D", {}),
+    ("object.omt_flow", "VIEW_3D", {"move": (0.0, 0.0, 0.25)}), ("object.omt_flow", "VIEW_3D", {"rotate": (0.5, 0, 0)}),
+])  # fmt: skip
+def test_where_nothing_is_dragged_the_settings_are_what_moves(package, monkeypatch, name, area, settings):
+    objects = bodies()
+    for obj in objects:
+        for vertex in obj.data.vertices:
+            vertex.select = vertex.co.z > 0.7
+    window, before = in_view(package, monkeypatch, area), state(objects)
+    operator = scenes.stand_in(name, **settings)
+    found = operator.invoke(window, mouse("LEFTMOUSE", "PRESS"))
+    while found == {"RUNNING_MODAL"}:
+        assert operator._drag is None and window.timers
+        found = operator.modal(window, mouse("TIMER"))
+    assert found == {"FINISHED"} and state(objects) != before and not window.timers
+
+
+@pytest.mark.parametrize(("name", "area"), [("object.omt_flow", "VIEW_3D"), ("uv.omt_flow", "IMAGE_EDITOR")])
+def test_a_drag_of_nothing_is_refused(package, monkeypatch, name, area):
+    objects = bodies()
+    for obj in objects:
+        for vertex in obj.data.vertices:
+            vertex.select = False
+        while obj.data.uv_layers:
+            obj.data.uv_layers.remove(obj.data.uv_layers[0])
+    window = in_view(package, monkeypatch, area)
+    operator = scenes.stand_in(name)
+    assert operator.invoke(window, mouse("LEFTMOUSE", "PRESS")) == {"CANCELLED"}
+    assert operator.reports[0][0] == {"ERROR"} and not window.listeners and window.hints == [None]
 
 
 @pytest.mark.parametrize("how", ["ESC", "RIGHTMOUSE", "cancel"])
@@ -173,3 +247,87 @@ def test_landmarks_that_were_picked_are_taken_back(mirrored, kind):
             count = len(bpy.data.objects)
             operator.modal(context, mouse("BACK_SPACE", "PRESS"))
             assert len(bpy.data.objects) == count - 1
+
+
+def picking(package, monkeypatch, **settings):
+    """Two bodies, a view of them from above, and what picks landmarks on them."""
+    objects = bodies()
+    for obj in objects:
+        # Their middles, four apart in the mesh, at -1 and 1.
+        obj.location, obj.scale = (-1, 0, 0), (0.5, 0.5, 0.5)
+    bpy.context.view_layer.update()
+    window = in_view(package, monkeypatch, "VIEW_3D")
+    operator = scenes.stand_in("object.omt_landmarks", **settings)
+    assert operator.invoke(window, mouse("LEFTMOUSE", "RELEASE")) == {"RUNNING_MODAL"}
+    assert window.listeners == [operator] and window.hints[-1]
+    return objects, window, operator
+
+
+def empties():
+    return {obj.name: obj for obj in bpy.data.objects if obj.type == "EMPTY"}
+
+
+def test_landmarks_are_where_they_are_clicked_and_go_where_they_are_dragged(package, monkeypatch):
+    objects, window, operator = picking(package, monkeypatch)
+    for obj, at in zip(objects, ((-1.1, 0.05), (0.9, 0.1)), strict=True):
+        pixel = View.pixel(at)
+        assert operator.modal(window, mouse("LEFTMOUSE", "PRESS", pixel)) == {"RUNNING_MODAL"}
+        (made,) = (e for e in empties().values() if e.parent == obj)
+        bpy.context.view_layer.update()
+        assert tuple(made.matrix_world.translation.xy) == pytest.approx(at, abs=1e-5)
+        # Seen from above, so on the upper side, which the eye sees.
+        assert made.matrix_world.translation.z > 0.1
+        # Held until it is let go of, and only ever on its own object.
+        to = (at[0] + 0.2, at[1])
+        operator.modal(window, mouse("MOUSEMOVE", at=View.pixel(to)))
+        bpy.context.view_layer.update()
+        assert tuple(made.matrix_world.translation.xy) == pytest.approx(to, abs=1e-5)
+        for other in ((-at[0], 0.0), (0.0, 0.95)):
+            operator.modal(window, mouse("MOUSEMOVE", at=View.pixel(other)))
+            bpy.context.view_layer.update()
+            assert tuple(made.matrix_world.translation.xy) == pytest.approx(to, abs=1e-5)
+        operator.modal(window, mouse("LEFTMOUSE", "RELEASE", View.pixel(to)))
+        operator.modal(window, mouse("MOUSEMOVE", at=pixel))
+        bpy.context.view_layer.update()
+        assert tuple(made.matrix_world.translation.xy) == pytest.approx(to, abs=1e-5)
+    assert len(empties()) == 2
+    # One that is there already is taken up again, the nearest one, where a click is within a few pixels.
+    for obj, at in zip(objects, ((-0.9, 0.05), (1.1, 0.1)), strict=True):
+        x, y = View.pixel(at)
+        assert operator.near(window, mouse("LEFTMOUSE", "PRESS", (x + 2, y - 1))).parent == obj
+        grasp = package("operators.shapes.landmarks").GRASP
+        assert operator.near(window, mouse("LEFTMOUSE", "PRESS", (x, y + grasp - 0.5))) is not None
+        assert operator.near(window, mouse("LEFTMOUSE", "PRESS", (x, y + grasp + 0.5))) is None
+        operator.modal(window, mouse("LEFTMOUSE", "PRESS", (x, y)))
+        operator.modal(window, mouse("LEFTMOUSE", "RELEASE", (x, y)))
+    assert len(empties()) == 2
+    # Beside both objects there is nothing.
+    operator.modal(window, mouse("LEFTMOUSE", "PRESS", View.pixel((0.0, 0.95))))
+    assert len(empties()) == 2 and operator._held is None
+    assert operator.modal(window, mouse("RET", "PRESS")) == {"FINISHED"}
+    assert window.hints[-1] is None and len(empties()) == 2
+
+
+def test_keys_while_landmarks_are_picked(package, monkeypatch):
+    objects, window, operator = picking(package, monkeypatch)
+    assert operator.mirrored is False
+    for expected in (True, False):
+        assert operator.modal(window, mouse("M", "PRESS")) == {"RUNNING_MODAL"}
+        operator.modal(window, mouse("M", "RELEASE"))
+        assert operator.mirrored is expected
+    for kind in package("operators.base").NAVIGATION - {"MOUSEMOVE"}:
+        assert operator.modal(window, mouse(kind, "PRESS")) == {"PASS_THROUGH"}
+    window.__dict__["region"] = SimpleNamespace(type="UI")
+    assert operator.modal(window, mouse("LEFTMOUSE", "PRESS", View.pixel((-1, 0)))) == {"PASS_THROUGH"}
+    assert operator.modal(window, mouse("ESC", "PRESS")) == {"CANCELLED"} and window.hints[-1] is None
+
+
+@pytest.mark.parametrize("area", ["IMAGE_EDITOR", None])
+def test_landmarks_are_picked_in_a_view_of_two_meshes_alone(package, monkeypatch, area):
+    objects = bodies()
+    window = in_view(package, monkeypatch, area or "VIEW_3D")
+    if area is None:
+        scenes.select(objects[:1])
+    operator = scenes.stand_in("object.omt_landmarks")
+    assert operator.invoke(window, mouse("LEFTMOUSE", "PRESS")) == {"CANCELLED"}
+    assert ("3D View" if area else "two mesh objects") in operator.reports[0][1] and not window.listeners

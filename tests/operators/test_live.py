@@ -35,7 +35,7 @@ def event(kind, value="NOTHING"):
 
 def begin(**options):
     operator = scenes.stand_in("uv.omt_live", **{"pack": False, **options})
-    assert operator.start(bpy.context) == {"RUNNING_MODAL"}
+    assert operator.begin(bpy.context) == {"RUNNING_MODAL"}
     return operator
 
 

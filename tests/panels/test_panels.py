@@ -269,7 +269,7 @@ def test_a_run_shows_its_progress(package):
     operator = scenes.stand_in("uv.omt_unwrap")
     running = package("session.run")
     (main,) = (p for p in our_classes(package, bpy.types.Panel) if p.bl_idname == "VIEW3D_PT_omt_uv")
-    assert operator.start(bpy.context) == {"RUNNING_MODAL"} or running.current is None
+    assert operator.begin(bpy.context) == {"RUNNING_MODAL"} or running.current is None
     if running.current is not None:
         record = draw(main)
         assert any(entry.startswith(("progress ", "label Charts")) for entry in record)

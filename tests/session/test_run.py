@@ -66,7 +66,7 @@ def event(kind, value="NOTHING"):
 
 def step(operator, count=None):
     """Start the operator and give it timer events until it ends, or `count` of them."""
-    state = operator.start(bpy.context)
+    state = operator.begin(bpy.context)
     while "RUNNING_MODAL" in state and (count is None or count > 0):
         state = operator.modal(bpy.context, event("TIMER"))
         count = None if count is None else count - 1
@@ -130,7 +130,7 @@ def test_a_second_run_is_refused(package):
     scene("uv.omt_unwrap", "OBJECT")
     first, second = scenes.stand_in("uv.omt_unwrap"), scenes.stand_in("uv.omt_refine")
     assert step(first, 1) == {"RUNNING_MODAL"}
-    assert second.start(bpy.context) == {"CANCELLED"}
+    assert second.begin(bpy.context) == {"CANCELLED"}
     assert "still running" in second.reports[0][1]
     first.cancel(bpy.context)
 

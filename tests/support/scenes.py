@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import CellType, FunctionType
+
 import bpy
 
 import numpy as np
@@ -216,14 +218,21 @@ def name_of(cls):
 def stand_in(name, **settings):
     """An operator as Blender would make it, with the class' own methods: there is no window to click in."""
     cls = class_of(name)
-    body = {"reports": []}
-    for base in reversed(cls.__mro__):
-        if not base.__module__.startswith("bpy") and base is not object:
-            body |= {k: v for k, v in vars(base).items() if not k.startswith("__") and k != "bl_rna"}
+    mixins = tuple(base for base in cls.__bases__ if not issubclass(base, bpy.types.bpy_struct))
+    body = {k: v for k, v in vars(cls).items() if not k.startswith("__") and k != "bl_rna"}
+    body["reports"] = []
     body["rna_type"] = bpy.context.window_manager.operator_properties_last(name).bl_rna
     for prop in body["rna_type"].properties:
         if not prop.is_readonly and prop.identifier != "rna_type":
             body[prop.identifier] = tuple(prop.default_array) if getattr(prop, "is_array", False) else prop.default
     body |= settings
     body["report"] = lambda self, kind, text: self.reports.append((set(kind), text))
-    return type("StandIn", (), body)()
+    made = type("StandIn", mixins, body)
+    for key, function in body.items():
+        # A method that goes on with its base's looks for that behind its own class, which no instance is of.
+        if isinstance(function, FunctionType) and "__class__" in function.__code__.co_freevars:
+            free = zip(function.__code__.co_freevars, function.__closure__, strict=True)
+            cells = [CellType(made) if variable == "__class__" else cell for variable, cell in free]
+            own = FunctionType(function.__code__, function.__globals__, key, function.__defaults__, tuple(cells))
+            setattr(made, key, own)
+    return made()

@@ -40,7 +40,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        state = self.start(context)
+        state = self.begin(context)
         if "RUNNING_MODAL" in state:
             self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
             context.window_manager.modal_handler_add(self)
@@ -48,12 +48,12 @@ class UV_OT_omt_queue(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """For scripts and the redo panel: all at once."""
-        state = self.start(context)
+        state = self.begin(context)
         while "RUNNING_MODAL" in state:
             state = self._advance(context)
         return state
 
-    def start(self, context: bpy.types.Context) -> set[str]:
+    def begin(self, context: bpy.types.Context) -> set[str]:
         following.keep(context)
         try:
             check_numbers(self)

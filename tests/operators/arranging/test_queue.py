@@ -37,7 +37,7 @@ def test_one_that_fails_is_named_and_selected_and_the_others_are_done(package):
 def test_a_time_limit_gives_one_up(package):
     obj = scenes.bump(40, 40)
     operator = scenes.stand_in("uv.omt_queue", limit=1e-9)
-    assert operator.start(bpy.context) == {"RUNNING_MODAL"}
+    assert operator.begin(bpy.context) == {"RUNNING_MODAL"}
     while operator._advance(bpy.context) == {"RUNNING_MODAL"}:
         pass
     (job,) = package("session.queue").state.jobs
@@ -48,7 +48,7 @@ def test_stop_keeps_what_is_done(package):
     objects = [scenes.bump(name=f"B{k}") for k in range(3)]
     scenes.select(objects)
     operator = scenes.stand_in("uv.omt_queue")
-    operator.start(bpy.context)
+    operator.begin(bpy.context)
     queue = package("session.queue")
     while queue.state.jobs[0].state != "DONE":
         operator._advance(bpy.context)
