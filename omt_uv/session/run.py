@@ -42,12 +42,14 @@ class Run:
         return time.monotonic() - self.began
 
     def advance(self, seconds: float = SLICE) -> bool:
-        """Work for about so long; whether the result is there.
+        """Work for about so long, whether the result is there. Linear algebra has one thread, as in a script: by
+        their number sums differ in the last bits.
 
         Raises
         ------
         Disturbed : the mesh or the mode has changed, so the result would be of no use
         """
+        from ..solver.blas_threads import one_blas_thread
         from ..solver.progress import ThreadProgress
 
         begin = time.monotonic()
@@ -55,7 +57,8 @@ class Run:
         more = True
         while more:
             try:
-                progress = next(self.steps)
+                with one_blas_thread():
+                    progress = next(self.steps)
             except StopIteration as stop:
                 self.result = stop.value
                 self._watch.check(thoroughly=True)

@@ -83,7 +83,7 @@ def drag(request, monkeypatch):
 
 
 class View:
-    """A view from above of 200 by 100 pixels, of which 50 are a unit: what the region and the view say of themselves."""
+    """A view from above of 200 by 100 pixels, of which 50 are a unit, as its region and itself tell of it."""
 
     width, height = 200, 100
     type, is_perspective, view_perspective = "WINDOW", False, "ORTHO"

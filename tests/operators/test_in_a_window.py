@@ -1,4 +1,4 @@
-"""What operators do in a window, which stands in for Blender's: timers, who hears events, hints, and what comes of it."""
+"""What operators do in a window, which stands in for Blender's: timers, listeners, hints, and what comes of it."""
 
 from __future__ import annotations
 
@@ -85,7 +85,8 @@ def test_a_click_ends_as_a_script_does(package, window, name):
         assert len(window.timers) == 1
         seen = max(seen, package("session.run").current.fraction)
     assert now == {"FINISHED"} and 0 < seen <= 1 and is_over(window, package)
-    assert {key: changed(expected[key], found) for key, found in all_of().items()} == dict.fromkeys(expected, set())
+    after = all_of()
+    assert after.keys() == expected.keys() and not any(changed(expected[key], after[key]) for key in after)
     assert not [text for kind, text in operator.reports if kind == {"ERROR"}]
     summary = package("session.last_run").state.summary
     assert summary.title == operator.bl_label and summary.rows[-1][0] == "Time" and not summary.refused

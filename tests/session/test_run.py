@@ -319,3 +319,36 @@ def test_bad_input_is_refused_in_the_first_slice():
     operator = scenes.stand_in("uv.omt_unwrap", seams="EXISTING")
     assert step(operator) == {"CANCELLED"}
     assert operator.reports[0][0] == {"ERROR"}
+
+
+@pytest.mark.parametrize("way", ["run", "queue"])
+def test_a_slice_has_the_one_thread_of_linear_algebra_that_a_script_has(package, way, monkeypatch):
+    """Sums differ in their last bits by the number of threads: a click made another mesh than a script."""
+    threads = package("solver.blas_threads")
+    obj, seen = scenes.bump(), []
+    np.ones((4, 4)) @ np.ones((4, 4))
+    before = [library.count() for library in threads.libraries()]
+    for library in threads.libraries():
+        library.limit(2)
+
+    def steps(*_):
+        for _ in range(3):
+            seen.append([library.count() for library in threads.libraries()])
+            yield package("solver.progress").Progress("", 0.0)
+
+    try:
+        if way == "run":
+            run = package("session.run").Run("", bpy.context, [obj], steps())
+            while not run.advance():
+                assert [library.count() for library in threads.libraries()] == [2] * len(before)
+            run.close()
+        else:
+            operator = scenes.stand_in("uv.omt_queue")
+            monkeypatch.setattr(type(operator), "_steps", steps)
+            monkeypatch.setattr(package("operators.arranging.queue"), "_write", lambda *_: None)
+            operator.execute(bpy.context)
+        assert seen == [[1] * len(before)] * 3
+        assert [library.count() for library in threads.libraries()] == [2] * len(before)
+    finally:
+        for library, count in zip(threads.libraries(), before, strict=True):
+            library.limit(count)
