@@ -167,7 +167,7 @@ def refined_on_subdivision(
     maps, fine_uv = [], part.mapping.matrix @ refined
     for k, old in enumerate(found.maps):
         mine, own = part.chart == k, slice(part.first[k], part.first[k + 1])
-        maps.append(_with_figures(old, refined[own], part.corners[mine], fine_uv[part.mapping.quads[mine]]))
+        maps.append(_with_figures(old, refined[own], part.corners[mine], part.mapping.quads[mine], fine_uv))
     error = part.area_error(refined)
     more = (COARSE.format(100 * error, APPLY_LEVEL),) if areas_first and error > INEXACT else ()
     return replace(found, maps=maps, warnings=(*found.warnings, *more))
@@ -329,14 +329,19 @@ def _mapped_part(
     return _MappedQuads(corners, polygon, chart, np.ones(len(polygon)), mapping, first)
 
 
-def _with_figures(old: ChartMap, uv: np.ndarray, corners: np.ndarray, mapped: np.ndarray) -> ChartMap:
-    """The map of a chart with its UVs and the figures of its quads (q,4,3) with UVs (q,4,2)."""
-    if not len(corners):
+def _with_figures(
+    old: ChartMap, uv: np.ndarray, corners: np.ndarray, quads: np.ndarray, fine_uv: np.ndarray
+) -> ChartMap:
+    """The map of a chart with its UVs and the figures of its quads (q,4), with corners (q,4,3) in space, in UVs (n,2)
+    of the subdivided surface."""
+    if not len(quads):
         return old
-    triangles = np.arange(6 * len(corners)).reshape(-1, 3)
-    points, coordinates = corners[:, HALVES].reshape(-1, 3), mapped[:, HALVES].reshape(-1, 3, 2)
-    polygons = np.repeat(np.arange(len(corners)), 2)
-    found = distortion(points, triangles, coordinates, overlap=False, polygons=polygons)
+    # By the numbers of their vertices quads hang together: those turned over are told from the rest.
+    points = np.zeros((len(fine_uv), 3))
+    points[quads.ravel()] = corners.reshape(-1, 3)
+    triangles = quads[:, HALVES].reshape(-1, 3)
+    polygons = np.repeat(np.arange(len(quads)), 2)
+    found = distortion(points, triangles, fine_uv[triangles], overlap=False, polygons=polygons)
     # What was said about the target of the cage is said about the subdivided surface instead.
     warnings = tuple(text for text in old.warnings if not text.startswith(AREA_WARNING))
     if found.folds:

@@ -197,7 +197,14 @@ def test_a_chart_on_a_subdivided_surface_has_its_figures_and_the_warnings_that_s
     )
     old = ChartMap(uv=np.zeros((6, 2)), status="converged", warnings=texts, **figures)
     uv = np.ones((6, 2))
-    found = subdivision._with_figures(old, uv, quads, flat)
+
+    def figures_of(row, mapped):
+        place, number = np.unique(row.reshape(-1, 3), axis=0, return_inverse=True)
+        fine = np.zeros((len(place), 2))
+        fine[number.ravel()] = mapped.reshape(-1, 2)
+        return subdivision._with_figures(old, uv, row, number.reshape(-1, 4), fine)
+
+    found = figures_of(quads, flat)
     assert found.uv is uv and found.warnings == ("another",)
     assert (found.area_l1, found.area_sd, found.folds) == (pytest.approx(0), pytest.approx(0), 0)
     assert found.angle_mean == pytest.approx(1)
@@ -208,10 +215,10 @@ def test_a_chart_on_a_subdivided_surface_has_its_figures_and_the_warnings_that_s
         # A row of quads, of which the last ones are turned over along their edge with the others.
         row = np.concatenate([quads[:1] + [k, 0, 0] for k in range(6)])
         turned = row[:, :, :2].copy()
-        turned[6 - count :, :, 0] = 2 * (6 - count) - turned[6 - count :, :, 0]
-        folded = subdivision._with_figures(old, uv, row, turned)
+        turned[:, :, 0] = np.minimum(turned[:, :, 0], 2 * (6 - count) - turned[:, :, 0])
+        folded = figures_of(row, turned)
         assert folded.folds == count and folded.warnings[-1].startswith(text) and len(folded.warnings) == 2
-    assert subdivision._with_figures(old, uv, quads[:0], flat[:0]) is old
+    assert subdivision._with_figures(old, uv, quads[:0], np.zeros((0, 4), int), np.zeros((0, 2))) is old
 
 
 def test_parts_that_lie_on_one_another_are_joined_with_their_marks_and_their_weights():
