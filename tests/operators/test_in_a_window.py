@@ -322,7 +322,9 @@ def test_warnings_are_shown_in_full_in_a_window_of_their_own(package, window):
     lines = []
 
     class Layout:
-        def label(self, text, **_):
+        def label(self, text, translate=True):
+            # Words of a result were translated before they were put together.
+            assert not translate
             lines.append(text)
 
         def separator(self):

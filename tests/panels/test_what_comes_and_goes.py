@@ -286,3 +286,11 @@ def test_a_handler_draws_while_colours_are_shown(package, monkeypatch):
         assert not on
     monkeypatch.undo()
     bpy.ops.uv.omt_overlay(show="NONE")
+
+
+def test_preferences_are_those_of_the_add_on_that_blender_knows(package):
+    """The package itself, or where it is in an extension the package that this is in."""
+    module = package("panels.preferences")
+    root = package("registration").__name__.rpartition(".")[0]
+    assert module.OMTUVPreferences.bl_idname == module.ADDON == (root.rpartition(".")[0] or root)
+    assert module.ADDON and root == module.PACKAGE

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import types
+
 import bpy
 
 import pytest
 import scenes
+from windows import Instead
 
 
 @pytest.mark.parametrize("value, text", [(0.0123, "0.01 s"), (9.994, "9.99 s"), (10.0, "10 s"), (123.4, "123 s")])
@@ -107,3 +110,39 @@ def test_the_panel_is_drawn_anew_where_the_figures_stop_to_hold_and_only_then(la
     last_run._look()
     last_run._look()
     assert len(drawn) == 1 and last_run.state.outdated
+
+
+def test_a_result_that_is_about_an_object_that_is_gone_watches_the_others(package):
+    last_run = package("session.last_run")
+    obj = scenes.bump()
+    last_run.keep(last_run.Summary("Unwrap", (), (), (obj.name, "gone")))
+    assert set(last_run.state.marks) == {obj.name} and last_run.look_again() == ""
+    obj.data.uv_layers.new(name="another")
+    assert last_run.look_again() == "the mesh has changed"
+    last_run.keep(last_run.Summary("Unwrap", (), (), (obj.name,)))
+    other = scenes.cube()
+    scenes.select([other])
+    assert last_run.look_again() == "others are selected"
+    scenes.select([])
+    assert last_run.look_again() == ""
+    bpy.data.objects.remove(obj)
+    assert last_run.look_again() == "an object is gone"
+    last_run.forget()
+    assert last_run.look_again() == "" and last_run.state.summary is None and not last_run.state.marks
+
+
+def test_the_panel_is_brought_up_to_date_once_it_is_quiet(package, monkeypatch):
+    last_run = package("session.last_run")
+    timers = {}
+    app = Instead(lambda: bpy.app, background=True, timers=types.SimpleNamespace(
+        is_registered=lambda f: f in timers, unregister=timers.pop,
+        register=lambda f, first_interval: timers.update({f: first_interval})))  # fmt: skip
+    monkeypatch.setattr(last_run, "bpy", Instead(lambda: bpy, app=app))
+    last_run._suspect()
+    assert not timers
+    app.__dict__["background"] = False
+    for _ in range(3):
+        last_run._suspect()
+    assert timers == {last_run._look: last_run.PATIENCE}
+    last_run.forget()
+    assert not timers
