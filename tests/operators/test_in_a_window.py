@@ -95,8 +95,13 @@ def test_a_click_ends_as_a_script_does(package, window, name):
     assert all(hint.startswith(f"{operator.bl_label}: ") and "Esc: Cancel" in hint for hint in told)
 
 
-@pytest.mark.parametrize("how", ["ESC", "cancel", "changed"])
-@pytest.mark.parametrize("name", SOLVERS)
+# All by the key, and some in every way.
+ENDED = [(name, "ESC") for name in SOLVERS] + [
+    (name, how) for name in ("uv.omt_seams", "uv.omt_flow", "object.omt_flow") for how in ("cancel", "changed")
+]
+
+
+@pytest.mark.parametrize(("name", "how"), ENDED)
 def test_what_is_let_be_has_changed_nothing(package, window, name, how):
     found = some()
     before = all_of()
@@ -160,7 +165,7 @@ def test_every_solver_refuses_to_begin_without_a_mesh(package, window):
         assert [kind for kind, _ in operator.reports] == [{"ERROR"}] and is_over(window, package), name
 
 
-@pytest.mark.parametrize("name", [*SOLVERS, "uv.omt_queue"])
+@pytest.mark.parametrize("name", ["uv.omt_seams", "uv.omt_flow", "object.omt_flow", "uv.omt_queue"])
 def test_without_a_window_all_is_done_at_once(package, window, name):
     some()
     window.__dict__["window"] = None
