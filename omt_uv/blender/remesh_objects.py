@@ -150,7 +150,8 @@ def alike(objects: list[bpy.types.Object], applied: bool) -> list[list[bpy.types
         # Lengths and angles of the axes, whatever way they point.
         metric = matrix.T @ matrix
         size = np.trace(metric)
-        scale = f"{size:.5g}", (metric / (size or 1)).round(5).tobytes()
+        # Adding zero makes -0.0 and 0.0 the same.
+        scale = f"{size:.5g}", ((metric / (size or 1)).round(5) + 0.0).tobytes()
         groups.setdefault(obj if applied else (obj.data, scale), []).append(obj)
     return list(groups.values())
 
