@@ -346,3 +346,45 @@ def test_what_is_due_is_what_is_new_changed_failed_or_was_never_ended(tmp_path):
     with manifest.Manifest(tmp_path / "m.sqlite") as mine:
         mine.due(plan_, tasks[3:], False)
         assert [row["name"] for row in mine.rows()] == ["running", "waiting"]
+
+
+def test_growth_is_that_of_the_larger_half_of_what_is_known():
+    from omt_uv.batch import figures, statistics
+
+    pairs = [(x, 3 * x**1.5) for x in (1.0, 2, 4, 8, 16, 32, 64, 128)]
+    # What every run takes counts less in the larger half.
+    slow = [(x, y + (100 if x < 16 else 0)) for x, y in pairs]
+    for given in (pairs, slow, [*pairs, (0.0, 5.0), (5.0, 0.0), (-1.0, 2.0)], pairs[::-1]):
+        assert statistics.growth_of(given) == pytest.approx(1.5)
+    assert statistics.growth_of(pairs[: statistics.LEAST - 1]) is None
+    assert statistics.growth_of([(7.0, y) for _, y in pairs]) is None
+    rows = [{"a": 1, "b": None}, {"a": 2.5}, {"a": "x", "b": 3}]
+    assert statistics._column(rows, "a") == [1.0, 2.5, None] and statistics._column(rows, "b") == [None, None, 3.0]
+    row = dict.fromkeys(figures.OWN, 1) | {"warnings": None, "report": None}
+    assert figures.flat_row(row)["warnings"] == 0
+    assert figures.flat_row(row | {"warnings": '["a", "b"]', "report": '{"faces": 3}'})["faces"] == 3
+    assert figures.figures_of("[]") == {} == figures.figures_of("no JSON")
+
+
+@pytest.mark.parametrize("name, suffix, expected", [
+    ("a.obj", "", "a.obj"), ("a.OFF", "", "a.ply"), ("b/a.obj", ".ply", "b/a.ply"), ("a.off", ".obj", "a.obj"),
+])  # fmt: skip
+def test_a_result_has_the_name_of_its_file_and_the_format_that_can_be_written(tmp_path, name, suffix, expected):
+    asked = replace(PLAN, suffix=suffix, output=tmp_path / "out")
+    task = plan._task(asked, name, tmp_path / name)
+    assert task.output == tmp_path / "out" / expected and (task.size, task.changed) == (0, 0)
+    assert plan._task(replace(asked, writes=False), name, tmp_path / name).output is None
+    plan._check_outputs([task, replace(task, output=None)])
+    other = replace(task, name="other")
+    with pytest.raises(plan.BatchError, match="would both become"):
+        plan._check_outputs([task, other])
+    with pytest.raises(plan.BatchError, match="would replace it"):
+        plan._check_outputs([replace(task, path=task.output)])
+
+
+def test_results_that_go_below_the_folder_of_the_files_are_no_files_of_it(tmp_path):
+    for name in ("a.obj", "out/b.obj", "sub/c.obj", ".hidden/d.obj", "sub/.e.obj", "f.txt", "sub/out/g.obj"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"x")
+    found = plan._of_folder(tmp_path, tmp_path / "out")
+    assert [name for name, _ in found] == ["a.obj", "sub/c.obj", "sub/out/g.obj"]
