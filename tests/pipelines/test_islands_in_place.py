@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import meshes
 import numpy as np
 import pytest
 from readings import reading
 
+from omt_uv.pipelines import refine
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.magnify import Magnified, Region, magnify
 from omt_uv.pipelines.refine import refine_islands
@@ -18,6 +20,7 @@ from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.subdivision.modifier import SubdivisionModifier
 
 FIGURES = ("area_l1", "area_sd", "angle_mean", "folds")
 
@@ -221,6 +224,46 @@ def test_a_refusal_says_whose_it_is_and_which_faces(which):
     with pytest.raises(Refusal, match="no UVs to refine") as caught:
         drain(refine_islands(given, RefineSettings()))
     assert caught.value.index == which
+
+
+@pytest.mark.parametrize("keep", [False, True])
+@pytest.mark.parametrize("pinned", [False, True])
+def test_islands_on_a_subdivided_surface_stay_where_they_are_too(keep, pinned):
+    """One surface has a modifier, the other has none: it is refined as without the first one's."""
+    patches = [Patch(19, 2, mirrored=(1,)), Patch(20, 1)]
+    if pinned:
+        patches[0].pinned = np.isin(patches[0].faces.ravel(), [vertex_of(patches[0], 0)])
+    settings = RefineSettings(quality="draft", keep_boundary=keep)
+    given = [p.given() for p in patches]
+    found = drain(refine_islands(given, settings, [SubdivisionModifier(1), None]))
+    uvs = [p.after(c, uv) for p, c, uv in zip(patches, found.corners, found.uv, strict=True)]
+    for patch, uv, rows in zip(patches, uvs, found.reports, strict=True):
+        _, old = patch.areas(patch.uv)
+        _, new = patch.areas(uv)
+        edges = np.sort(patch.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        once, count = np.unique(edges, axis=0, return_counts=True)
+        outline = np.isin(patch.faces.ravel(), once[count == 1])
+        for k, row in enumerate(rows):
+            mine = patch.of == k
+            assert (np.sign(new[mine]) == np.sign(old[mine].sum())).all() and row["folds"] == 0
+            assert row["area_l1"] < 0.8 * row["before"]["area_l1"]
+            corners = np.repeat(mine, 3)
+            if keep:
+                assert uv[corners & outline] == pytest.approx(patch.uv[corners & outline], abs=1e-7)
+            elif not (pinned and patch is patches[0] and k == 0):
+                assert patch.middle(uv, k) == pytest.approx(patch.middle(patch.uv, k), abs=0.02)
+                assert abs(patch.turn(uv, k)) < 0.15
+        if pinned and patch is patches[0]:
+            assert (uv[patch.pinned] == patch.uv[patch.pinned]).all()
+    alone = drain(refine_islands(given[1:], settings))
+    if keep:
+        np.testing.assert_allclose(alone.uv[0], found.uv[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("status, told", [("steps", 1), ("converged", 0), ("stalled", 0)])
+def test_a_refinement_that_used_up_its_steps_is_told(status, told):
+    found = refine._unfinished(SimpleNamespace(status=status))
+    assert len(found) == told and all("stopped before it was done" in text for text in found)
 
 
 # ---- regions of islands ---------------------------------------------------------------------------------------
