@@ -213,7 +213,7 @@ def test_sides_that_lie_on_one_another_are_joined_where_all_can_be_and_opened_ag
     assert len(np.unique(found.triangles)) == len(W) - 3
     apart = join_coincident(np.concatenate([V, V + [2, 0, 0]]), G)
     assert (apart.triangles == G).all()
-    # A third sheet at the same edge would be one too many.
+    # A third side at the same edge would be one too many.
     third = join_coincident(np.concatenate([W, V[:, [2, 1, 0]] + [1, 0, 0]]), np.concatenate([G, F + 2 * len(V)]))
     assert len(np.unique(third.triangles)) == 3 * len(V)
     assert reopened(V, F, np.zeros(0, np.int64))[0] is V
