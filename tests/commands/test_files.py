@@ -60,7 +60,7 @@ def write(path, points, faces):
         scenes.add(points.tolist(), faces.tolist())
         if path.suffix in (".glb", ".gltf"):
             form = "GLB" if path.suffix == ".glb" else "GLTF_SEPARATE"
-            bpy.ops.export_scene.gltf(filepath=str(path), export_format=form, export_normals=False)
+            scenes.export_gltf(path, export_format=form, export_normals=False)
         elif path.suffix == ".fbx":
             bpy.ops.export_scene.fbx(filepath=str(path))
         else:
@@ -151,7 +151,7 @@ def test_obj_keeps_the_order_of_faces_over_materials(package, run, tmp_path):
 def test_flat_shaded_glb_is_one_island(package, run, tmp_path):
     """glTF splits every vertex of a flat-shaded mesh; that does not make every face an island."""
     scenes.bump()
-    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "in.glb"), export_format="GLB", export_normals=True)
+    scenes.export_gltf(tmp_path / "in.glb", export_format="GLB", export_normals=True)
     status, _, _ = run("unwrap", tmp_path / "in.glb", "-o", tmp_path / "out.blend", "--report", tmp_path / "r.json")
     assert status == 0
     assert len(json.loads((tmp_path / "r.json").read_text())["charts"]) == 1

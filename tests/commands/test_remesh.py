@@ -136,7 +136,7 @@ def test_glb_is_joined_where_the_format_had_to_split_it(run, tmp_path):
     """A file of this format has a vertex for every UV; the new mesh must not come apart along the seams."""
     obj = scenes.cube()
     bpy.ops.uv.omt_unwrap()
-    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "in.glb"), export_format="GLB", use_selection=True)
+    scenes.export_gltf(tmp_path / "in.glb", export_format="GLB", use_selection=True)
     assert obj.name == "Cube"
     status, _, _ = run("remesh", tmp_path / "in.glb", "-o", tmp_path / "out.blend", "--vertices", 300, "--sharp")
     assert status == 0

@@ -126,11 +126,11 @@ def opened(package, path):
 def exporters():
     return {
         ".fbx": lambda path: bpy.ops.export_scene.fbx(filepath=path, add_leaf_bones=False, colors_type="LINEAR"),
-        ".glb": lambda path: bpy.ops.export_scene.gltf(
-            filepath=path, export_format="GLB", export_cameras=True, export_lights=True, export_extras=True
+        ".glb": lambda path: scenes.export_gltf(
+            path, export_format="GLB", export_cameras=True, export_lights=True, export_extras=True
         ),
-        ".gltf": lambda path: bpy.ops.export_scene.gltf(
-            filepath=path, export_format="GLTF_SEPARATE", export_cameras=True, export_lights=True, export_extras=True
+        ".gltf": lambda path: scenes.export_gltf(
+            path, export_format="GLTF_SEPARATE", export_cameras=True, export_lights=True, export_extras=True
         ),
         ".blend": lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, compress=True),
     }
@@ -229,7 +229,7 @@ def test_a_new_uv_map_and_seams_that_a_file_does_not_hold_are_named(run, tmp_pat
     bpy.ops.object.select_all(action="SELECT")
     path = tmp_path / f"in{suffix}"
     if suffix == ".glb":
-        bpy.ops.export_scene.gltf(filepath=str(path))
+        scenes.export_gltf(path)
     else:
         getattr(bpy.ops.wm, f"{suffix[1:]}_export")(filepath=str(path))
     words = ("unwrap", path, "-o", tmp_path / f"out{suffix}", "--quality", "draft")

@@ -33,6 +33,12 @@ def select(objects):
     bpy.context.view_layer.objects.active = objects[-1] if objects else None
 
 
+def export_gltf(path, **settings):
+    """Write all objects with Blender's exporter; that of 4.2 crashes now and then, as `files.export` says."""
+    bpy.context.view_layer.update()
+    bpy.ops.export_scene.gltf(filepath=str(path), **settings)
+
+
 def bump(columns=8, rows=6, height=0.5, name="Bump", offset=0.0):
     """A curved patch of quads."""
     y, x = np.mgrid[0 : rows + 1, 0 : columns + 1]
