@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import bpy
 
 import numpy as np
@@ -113,3 +116,39 @@ def test_what_cannot_be_undone_or_is_kept_by_no_group_is_refused(package, bodies
     bpy.context.view_layer.update()
     with pytest.raises(package("solver.errors").NonFiniteError, match="cannot be undone"):
         bodies.read_body(obj)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("log", [-3.0, -1.0, -0.25, 0.0, 0.5, 1.0, 4.0])
+def test_a_slice_is_red_where_volumes_grow_blue_where_they_shrink_and_no_colour_is_out_of_range(
+    package, monkeypatch, log, axis
+):
+    """The cut is that of one tetrahedron on the axes; dilations are logarithms of two, given here."""
+    tets = package("blender.volumes.tet_objects")
+    points = np.vstack([np.zeros(3), np.eye(3)])
+    volume = SimpleNamespace(points=points, positions=points, tets=np.array([[0, 1, 2, 3]]))
+    cut = tets.plane_slice
+    monkeypatch.setattr(tets, "plane_slice", lambda *given: replace(cut(*given), dilation=np.array([log])))
+    obj = tets.slice_object(scenes.cube(), SimpleNamespace(map=volume), axis, 0.25)
+    (values,) = {d.value for d in obj.data.attributes[tets.DILATION].data}
+    assert values == log
+    places = np.array([v.co[:] for v in obj.data.vertices])
+    np.testing.assert_allclose(places[:, axis], 0.25, atol=1e-6)
+    np.testing.assert_allclose(sorted(p.area for p in obj.data.polygons), [0.75**2 / 2], rtol=1e-5)
+    t = min(1, max(-1, values))
+    expected = (1, 1 - t, 1 - t, 1) if t >= 0 else (1 + t, 1 + t, 1, 1)
+    colours = {d.color[:] for d in obj.data.color_attributes[f"{tets.DILATION} Colour"].data}
+    np.testing.assert_allclose(list(colours), [expected], atol=1e-5)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_shells_and_points_of_a_body_are_as_many_as_asked_and_inside(package, count):
+    tets = package("blender.volumes.tet_objects")
+    points = np.vstack([np.zeros(3), np.eye(3)])
+    volume = SimpleNamespace(points=points, positions=points, tets=np.array([[0, 1, 2, 3]]))
+    found = SimpleNamespace(map=volume, ball=points - points.mean(axis=0))
+    like = scenes.cube("Body")
+    dots = tets.point_object(like, found, 5 * count, 0)
+    assert len(dots.data.vertices) == 5 * count and not dots.data.polygons and dots.name == "Body Points"
+    at = np.array([v.co[:] for v in dots.data.vertices])
+    assert (at > -1e-6).all() and (at.sum(axis=1) < 1 + 1e-6).all()

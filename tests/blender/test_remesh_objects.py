@@ -166,3 +166,25 @@ def test_objects_elsewhere_are_left_alone():
     remesh(target_vertices=100)
     assert scenes.state(other) == before
     assert len(made(all_before)) == 1
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+@pytest.mark.parametrize("shared", [False, True])
+def test_new_objects_and_their_meshes_are_named_after_their_object_and_level(levels, shared):
+    obj = scenes.cube("Box")
+    objects = [obj]
+    if shared:
+        other = bpy.data.objects.new("Twin", obj.data)
+        bpy.context.collection.objects.link(other)
+        objects.append(other)
+        bpy.context.view_layer.update()
+    scenes.select(objects)
+    old = {o.name for o in bpy.data.objects}
+    assert bpy.ops.object.omt_remesh(target_vertices=60, levels=levels) == {"FINISHED"}
+    made = [o for o in bpy.data.objects if o.name not in old]
+    endings = ["_remesh"] if levels == 1 else [f"_LOD{k}" for k in range(levels)]
+    assert {o.name for o in made} == {o.name + e for o in objects for e in endings}
+    for new in made:
+        (ending,) = [e for e in endings if new.name.endswith(e)]
+        assert new.data.name in {o.name + ending for o in objects}
+    assert len({o.data.name for o in made}) == levels

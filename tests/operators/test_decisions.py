@@ -312,3 +312,10 @@ def test_only_a_transfer_has_kinds_of_what_is_transferred(mode):
         mode = prop.enum_items[-1].identifier
     found = scenes.stand_in("object.omt_match", mode=mode, transfer={"UV", "GROUPS"}).kinds()
     assert found == ({"uv", "groups"} if mode == "TRANSFER" else set())
+
+
+@pytest.mark.parametrize("about", [(), ("Cube",), ("Cube", ValueError("why"))])
+def test_a_complaint_reads_as_its_message_whatever_it_is_about(package, about):
+    found = package("operators.base").Complaint("Nothing is selected.", *about)
+    assert str(found) == "Nothing is selected."
+    assert (found.obj, found.error) == (*about, None, None)[:2]

@@ -123,7 +123,11 @@ def test_keys_come_turned_off_and_go_with_the_extension(package, monkeypatch):
         # What a key runs exists.
         group, verb = key.operator.split(".")
         assert verb in dir(getattr(bpy.ops, group)) and (not key.menu or hasattr(bpy.types, key.menu))
-    # Each is drawn once, under the name of its map, as the artist has it.
+    # Each is drawn once, under the name of its map, as the artist has it, and no other call of the same operator.
+    for items in maps.values():
+        for other in (SimpleNamespace(name="VIEW3D_MT_object"), SimpleNamespace()):
+            items.insert(0, SimpleNamespace(idname="wm.call_menu", properties=other))
+        items.insert(0, SimpleNamespace(idname="uv.unwrap", properties=SimpleNamespace()))
     shown = []
     ui = SimpleNamespace(draw_kmi=lambda _, c, mine, item, row, level: shown.append((mine.name, item)))
     monkeypatch.setitem(sys.modules, "rna_keymap_ui", ui)
