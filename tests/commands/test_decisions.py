@@ -158,3 +158,23 @@ def test_a_picture_is_of_what_was_made_or_of_what_it_lies_on(package, monkeypatc
     obj, points = scenes.bump(2, 2), scenes.add([(0, 0, 0)], [], "Points")
     partition._show(None, [(obj, None)], [points, obj] if wrap else [points])
     assert shown == [[obj]]
+
+
+@pytest.mark.parametrize("start", [None, ("python", "x.py")])
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("scheduler", ["", "local:2", "tcp://far:8786"])
+def test_a_batch_runs_here_or_on_a_cluster_with_what_was_given(package, monkeypatch, capfd, scheduler, apart, start):
+    batch = package("commands.batches.batch")
+    monkeypatch.setattr(package("batch.pool"), "LocalPool", lambda *given: SimpleNamespace(given=given))
+    monkeypatch.setattr(
+        package("batch.cluster"),
+        "Cluster",
+        lambda *given: SimpleNamespace(given=given, warnings=lambda: ["It is far."]),
+    )
+    options = argparse.Namespace(scheduler=scheduler, jobs=3, total_memory=5.0, apart=apart, send=apart)
+    if start:
+        options.start = start
+    words = start or (sys.executable, "-m", batch.PROGRAM)
+    expected = ("plan", words, scheduler, apart) if scheduler else ("plan", words, 3, 5.0, not apart)
+    assert batch._runner(options, "plan").given == expected
+    assert ("It is far." in capfd.readouterr().err) == bool(scheduler)

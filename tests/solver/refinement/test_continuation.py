@@ -1,6 +1,8 @@
 """Stages of growing area weight: how they end, and what does not change the way."""
 
 from dataclasses import dataclass, replace
+from itertools import product
+from types import SimpleNamespace
 
 import meshes
 import numpy as np
@@ -14,6 +16,7 @@ from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement import continuation
 from omt_uv.solver.refinement.continuation import (
     MapProblem,
     StageLimits,
@@ -24,7 +27,14 @@ from omt_uv.solver.refinement.continuation import (
     minimise_in_stages,
     rescaled,
 )
-from omt_uv.solver.refinement.continuation_rules import QUALITIES
+from omt_uv.solver.refinement.continuation_rules import (
+    AHEAD,
+    NEAR,
+    QUALITIES,
+    SQUEEZED,
+    SQUEEZED_WEIGHT,
+    planned_weights,
+)
 from omt_uv.solver.refinement.hessian_blocks import Assembly, assembly_of
 from omt_uv.solver.refinement.projected_newton import FreeMotion, NewtonStep
 
@@ -208,3 +218,27 @@ def test_a_stage_on_the_way_was_the_last_where_nothing_is_traded_and_nothing_is_
     for quality in QUALITIES.values():
         stage = StageResult(np.zeros(3), 3, share * quality.loose_tolerance, 1.0, status)
         assert is_through(stage, balance, quality) == (balance == 0 and status == "converged" and share < 1)
+
+
+@pytest.mark.parametrize("quality", QUALITIES.values(), ids=list(QUALITIES))
+@pytest.mark.parametrize("balance", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(("warm", "prolonged"), [(False, False), (False, True), (True, False), (True, True)])
+def test_the_first_stage_goes_by_how_good_the_start_is(quality, balance, warm, prolonged):
+    """A start that is near the end begins at the second weight, one that is squeezed at a weight before the first; only
+    then there is a stage to take back. No map is made: energies at the first two weights are given."""
+    planned = planned_weights(balance, quality)
+    for first, share in product((SQUEEZED / 2, SQUEEZED, 2 * SQUEEZED), (AHEAD / 2, AHEAD, 1.0)):
+
+        def problem_at(w, weight, is_barrier, first=first, share=share):
+            assert w == "start" and weight in planned[:2] and not is_barrier
+            return SimpleNamespace(energy=lambda w: first if weight == planned[0] else share * first)
+
+        problem = SimpleNamespace(newton_problem=problem_at, faces=SimpleNamespace(polygon=None))
+        weights, before = continuation._first_weights(problem, "start", balance, quality, (warm, prolonged))
+        if warm and len(planned) > 1:
+            assert (weights, before) == ([NEAR * w for w in planned[1:]], False)
+        elif first > SQUEEZED and planned[0] > SQUEEZED_WEIGHT:
+            assert (weights, before) == ([SQUEEZED_WEIGHT, *planned], True)
+        else:
+            ahead = prolonged and balance == 0 and len(planned) > 1 and share < AHEAD
+            assert (weights, before) == (planned[1:] if ahead else planned, False)
