@@ -136,8 +136,8 @@ def test_an_isometry_has_its_angles_its_areas_and_no_folds():
 @pytest.mark.parametrize("excess, before, hardly", [(0.5, 0.5, True), (0.4, 0.5, False), (0.46, 0.5, True),
                                                     (0.02, 0.02, False), (0.041, 0.02, True)])  # fmt: skip
 def test_a_round_is_hardly_better_where_little_is_won_and_much_is_left(excess, before, hardly):
-    of = SimpleNamespace(excess=excess, bound=1.35)
-    assert shear_search.Round.is_hardly_better(of, SimpleNamespace(excess=before)) == hardly
+    of, then = (SimpleNamespace(excess=x, bound=1.35, area=np.ones(2), searched=[1]) for x in (excess, before))
+    assert shear_search.Round.is_hardly_better(of, then) == hardly
 
 
 @pytest.mark.parametrize("late", [False, True])

@@ -33,6 +33,7 @@ from omt_uv.solver.refinement.continuation_rules import (
     QUALITIES,
     SQUEEZED,
     SQUEEZED_WEIGHT,
+    UNSQUEEZED,
     planned_weights,
 )
 from omt_uv.solver.refinement.hessian_blocks import Assembly, assembly_of
@@ -224,20 +225,24 @@ def test_a_stage_on_the_way_was_the_last_where_nothing_is_traded_and_nothing_is_
 @pytest.mark.parametrize("balance", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize(("warm", "prolonged"), [(False, False), (False, True), (True, False), (True, True)])
 def test_the_first_stage_goes_by_how_good_the_start_is(quality, balance, warm, prolonged):
-    """A start that is near the end begins at the second weight, one that is squeezed at a weight before the first; only
-    then there is a stage to take back. No map is made: energies at the first two weights are given."""
+    """A start that is near the end begins at the second weight, one that is squeezed, and sheared, at a weight before
+    the first; only then there is a stage to take back. No map is made: energies at the first two weights are given, and
+    that of the shear alone, at weight 0."""
     planned = planned_weights(balance, quality)
-    for first, share in product((SQUEEZED / 2, SQUEEZED, 2 * SQUEEZED), (AHEAD / 2, AHEAD, 1.0)):
+    shears = (UNSQUEEZED, 1.01 * UNSQUEEZED)
+    for first, share, shear in product((SQUEEZED / 2, SQUEEZED, 2 * SQUEEZED), (AHEAD / 2, AHEAD, 1.0), shears):
 
-        def problem_at(w, weight, is_barrier, first=first, share=share):
-            assert w == "start" and weight in planned[:2] and not is_barrier
+        def problem_at(w, weight, is_barrier, first=first, share=share, shear=shear):
+            assert w == "start" and weight in (0.0, *planned[:2]) and not is_barrier
+            if weight == 0:
+                return SimpleNamespace(energy=lambda w: shear)
             return SimpleNamespace(energy=lambda w: first if weight == planned[0] else share * first)
 
         problem = SimpleNamespace(newton_problem=problem_at, faces=SimpleNamespace(polygon=None))
         weights, before = continuation._first_weights(problem, "start", balance, quality, (warm, prolonged))
         if warm and len(planned) > 1:
             assert (weights, before) == ([NEAR * w for w in planned[1:]], False)
-        elif first > SQUEEZED and planned[0] > SQUEEZED_WEIGHT:
+        elif first > SQUEEZED and planned[0] > SQUEEZED_WEIGHT and shear > UNSQUEEZED:
             assert (weights, before) == ([SQUEEZED_WEIGHT, *planned], True)
         else:
             ahead = prolonged and balance == 0 and len(planned) > 1 and share < AHEAD
