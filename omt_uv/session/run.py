@@ -42,23 +42,20 @@ class Run:
         return time.monotonic() - self.began
 
     def advance(self, seconds: float = SLICE) -> bool:
-        """Work for about so long, whether the result is there. Linear algebra has one thread, as in a script: by
-        their number sums differ in the last bits.
+        """Work for about so long; whether the result is there.
 
         Raises
         ------
         Disturbed : the mesh or the mode has changed, so the result would be of no use
         """
-        from ..solver.blas_threads import one_blas_thread
-        from ..solver.progress import ThreadProgress
+        from ..solver.progress import ThreadProgress, take_step
 
         begin = time.monotonic()
         self._watch.check()
         more = True
         while more:
             try:
-                with one_blas_thread():
-                    progress = next(self.steps)
+                progress = take_step(self.steps)
             except StopIteration as stop:
                 self.result = stop.value
                 self._watch.check(thoroughly=True)

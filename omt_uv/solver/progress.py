@@ -49,6 +49,16 @@ class ThreadProgress(Progress):
 Steps: TypeAlias = Generator[Progress, None, T]
 
 
+def take_step(steps: Iterator[Progress]) -> Progress:
+    """One step of a solver. Linear algebra has one thread, as in `drain`: by their number sums differ in the last bits.
+
+    Raises StopIteration with the result at the end.
+    """
+    keep_freed()
+    with one_blas_thread():
+        return next(steps)
+
+
 def drain(steps: Steps[T], callback: Callable[[Progress], None] | None = None) -> T:
     """Run a solver to its end and return its result; `callback` sees every Progress."""
     keep_freed()

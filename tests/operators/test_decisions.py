@@ -9,20 +9,12 @@ import bpy
 
 import pytest
 import scenes
-from dressed_bodies import bodies
+from dressed_bodies import bodies_with_some_selected
 from kept import Recorder
-from windows import Instead, Window, event, in_front
+from windows import Instead, Window, event, in_front, in_single_steps
 
 RUNNING = {"RUNNING_MODAL"}
 KEYS = ("ESC", "RET", "NUMPAD_ENTER", "RIGHTMOUSE", "BACK_SPACE", "M")
-
-
-def selected():
-    found = bodies()
-    for obj in found:
-        for vertex in obj.data.vertices:
-            vertex.select = vertex.index < 3
-    return found
 
 
 MODAL = {"object.omt_flow": "VIEW_3D", "uv.omt_flow": "IMAGE_EDITOR", "object.omt_landmarks": "VIEW_3D",
@@ -31,10 +23,9 @@ MODAL = {"object.omt_flow": "VIEW_3D", "uv.omt_flow": "IMAGE_EDITOR", "object.om
 
 @pytest.mark.parametrize("name", MODAL)
 def test_a_key_let_go_of_ends_nothing(package, monkeypatch, name):
-    selected()
+    bodies_with_some_selected()
     in_front(monkeypatch, package)
-    monkeypatch.setattr(package("session.run"), "threads", False)
-    monkeypatch.setattr(package("session.run").Run.advance, "__defaults__", (0.0,))
+    in_single_steps(monkeypatch, package)
     window = Window(MODAL[name])
     operator = scenes.stand_in(name, **({"pack": False} if name == "uv.omt_live" else {}))
     operator._place = lambda *_: (0.5, 0.5)
@@ -59,7 +50,7 @@ def test_a_key_let_go_of_ends_nothing(package, monkeypatch, name):
                                   ("LEFT_SHIFT", "PRESS", True)])  # fmt: skip
 def test_a_step_of_undo_is_made_before_a_key_that_does_something(package, monkeypatch, keys):
     kind, value, unmarked = keys
-    selected()
+    bodies_with_some_selected()
     live = scenes.stand_in("uv.omt_live")
     pushed = []
     undo = SimpleNamespace(ed=SimpleNamespace(undo_push=lambda message: pushed.append(message)))
@@ -138,7 +129,7 @@ def test_versions_are_compared_of_the_active_mesh_or_of_one_that_is_selected(kin
 
 
 def test_a_queue_goes_on_without_what_is_in_no_view_layer(package):
-    found = selected()
+    found = bodies_with_some_selected()
     operator, queue = scenes.stand_in("uv.omt_queue"), package("session.queue")
     assert operator.begin(bpy.context) == RUNNING
     jobs = {job.name: job for job in queue.state.jobs}
@@ -153,7 +144,7 @@ def test_a_queue_goes_on_without_what_is_in_no_view_layer(package):
 @pytest.mark.parametrize("area", ["VIEW_3D", None])
 @pytest.mark.parametrize("region", [False, True])
 def test_handles_are_dragged_where_there_is_a_view_to_drag_them_in(package, monkeypatch, handles, area, region):
-    selected()
+    bodies_with_some_selected()
     in_front(monkeypatch, package)
     window = Window(area or "", region_data=object() if region else None)
     if area is None:

@@ -6,8 +6,8 @@ import bpy
 
 import pytest
 import scenes
-from dressed_bodies import bodies, state
-from windows import Window, event, in_front
+from dressed_bodies import bodies_with_some_selected, state
+from windows import Window, event, in_front, in_single_steps
 
 # Solvers that two bodies with UVs and a painted group are enough for; numbers that single precision holds.
 SOLVERS = {
@@ -28,23 +28,13 @@ RUNNING = {"RUNNING_MODAL"}
 def window(package, monkeypatch):
     """A window, in which a slice of a run is one step of it."""
     in_front(monkeypatch, package)
-    run = package("session.run")
-    monkeypatch.setattr(run.Run.advance, "__defaults__", (0.0,))
-    monkeypatch.setattr(run, "threads", False)
+    in_single_steps(monkeypatch, package)
     # In the UV editor some begin a drag.
     yield Window("VIEW_3D")
+    run = package("session.run")
     left, run.current = run.current, None
     if left is not None:
         left.close()
-
-
-def some():
-    """Two bodies, of which some vertices are selected."""
-    found = bodies()
-    for obj in found:
-        for vertex in obj.data.vertices:
-            vertex.select = vertex.index < 3
-    return found
 
 
 def all_of():
@@ -71,12 +61,12 @@ def is_over(window, package):
 
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_click_ends_as_a_script_does(package, window, name):
-    some()
+    bodies_with_some_selected()
     module, verb = name.split(".")
     assert getattr(getattr(bpy.ops, module), verb)(**SOLVERS[name]) == {"FINISHED"}
     expected = all_of()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    some()
+    bodies_with_some_selected()
     operator, seen = scenes.stand_in(name, **SOLVERS[name]), 0
     assert operator.invoke(window, event("LEFTMOUSE")) == RUNNING
     assert window.listeners == [operator] and [w for _, w in window.timers] == [window.window]
@@ -103,7 +93,7 @@ ENDED = [(name, "ESC") for name in SOLVERS] + [
 
 @pytest.mark.parametrize(("name", "how"), ENDED)
 def test_what_is_let_be_has_changed_nothing(package, window, name, how):
-    found = some()
+    found = bodies_with_some_selected()
     before = all_of()
     operator = scenes.stand_in(name, **SOLVERS[name])
     assert operator.invoke(window, event("LEFTMOUSE")) == RUNNING
@@ -137,7 +127,7 @@ def test_no_setting_hides_what_an_operator_does(package):
 
 
 def test_the_view_can_be_moved_and_nothing_else_begun_while_one_runs(package, window):
-    some()
+    bodies_with_some_selected()
     operator = scenes.stand_in("uv.omt_unwrap")
     operator.invoke(window, event("LEFTMOUSE"))
     navigation = package("operators.base").NAVIGATION
@@ -167,7 +157,7 @@ def test_every_solver_refuses_to_begin_without_a_mesh(package, window):
 
 @pytest.mark.parametrize("name", ["uv.omt_seams", "uv.omt_flow", "object.omt_flow", "uv.omt_queue"])
 def test_without_a_window_all_is_done_at_once(package, window, name):
-    some()
+    bodies_with_some_selected()
     window.__dict__["window"] = None
     operator = scenes.stand_in(name, **SOLVERS.get(name, {}))
     assert operator.invoke(window, event("LEFTMOUSE")) == {"FINISHED"}
@@ -176,11 +166,11 @@ def test_without_a_window_all_is_done_at_once(package, window, name):
 
 def test_a_queue_ends_as_a_script_does_and_says_what_it_did(package, window):
     queue = package("session.queue")
-    names = [obj.name for obj in some()]
+    names = [obj.name for obj in bodies_with_some_selected()]
     assert bpy.ops.uv.omt_queue() == {"FINISHED"}
     expected = all_of()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    some()
+    bodies_with_some_selected()
     operator = scenes.stand_in("uv.omt_queue")
     assert operator.invoke(window, event("LEFTMOUSE")) == RUNNING
     assert len(window.timers) == 1 and window.listeners == [operator]
@@ -198,7 +188,7 @@ def test_a_queue_ends_as_a_script_does_and_says_what_it_did(package, window):
 
 @pytest.mark.parametrize("how", ["ESC", "cancel", "gone"])
 def test_a_queue_that_is_stopped_keeps_what_is_done(package, window, how):
-    found = some()
+    found = bodies_with_some_selected()
     before = all_of()
     operator = scenes.stand_in("uv.omt_queue")
     operator.invoke(window, event("LEFTMOUSE"))
@@ -229,7 +219,7 @@ def test_a_queue_that_is_stopped_keeps_what_is_done(package, window, how):
 
 
 def test_live_balance_hears_a_window_until_its_button_is_clicked_again(package, window):
-    some()
+    bodies_with_some_selected()
     following = package("session.following")
     operator = scenes.stand_in("uv.omt_live", pack=False)
     assert operator.invoke(window, event("LEFTMOUSE")) == RUNNING and following.current is not None
@@ -311,7 +301,7 @@ def test_help_opens_the_page_of_what_it_stands_beside(package, monkeypatch):
 
 
 def test_a_report_goes_to_the_clipboard_as_it_is(package, window):
-    some()
+    bodies_with_some_selected()
     operator = scenes.stand_in("wm.omt_copy_report")
     assert operator.execute(window) == {"FINISHED"}
     assert window.window_manager.clipboard == package("operators.report").report_text(bpy.context)
@@ -343,7 +333,7 @@ def test_warnings_are_shown_in_full_in_a_window_of_their_own(package, window):
 
 @pytest.mark.parametrize("action", ["MERGE", "NORMALS", "CUT_FURTHER"])
 def test_a_remedy_is_done_by_a_click(package, window, action):
-    found = some()
+    found = bodies_with_some_selected()
     for obj in found:
         scenes.set_uv(obj, scenes.uv_of(obj) * 0, obj.data.uv_layers.active.name)
     before = all_of()
@@ -357,7 +347,7 @@ def test_a_remedy_is_done_by_a_click(package, window, action):
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 @pytest.mark.parametrize("show", [False, True])
 def test_weights_are_shown_where_they_can_be_painted(package, window, monkeypatch, mode, show):
-    found = some()
+    found = bodies_with_some_selected()
     spaces = [type("Space", (), {"overlay": type("Overlay", (), {"show_weight": False})()})() for _ in range(2)]
     monkeypatch.setattr(package("operators.regions.weights"), "view_spaces", lambda _: spaces)
     if mode == "EDIT":

@@ -62,3 +62,12 @@ def state(obj):
     found["sharp"] = [edge.use_edge_sharp for edge in obj.data.edges]
     found["matrix"] = [tuple(row) for row in obj.matrix_world]
     return found
+
+
+def bodies_with_some_selected():
+    """The same two, of which some vertices are selected."""
+    found = bodies()
+    for obj in found:
+        for vertex in obj.data.vertices:
+            vertex.select = vertex.index < 3
+    return found

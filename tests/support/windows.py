@@ -48,6 +48,13 @@ def in_front(monkeypatch, package) -> None:
             monkeypatch.setattr(module, "bpy", there)
 
 
+def in_single_steps(monkeypatch, package) -> None:
+    """Let a slice of a run be one step of it."""
+    run = package("session.run")
+    monkeypatch.setattr(run.Run.advance, "__defaults__", (0.0,))
+    monkeypatch.setattr(run, "threads", False)
+
+
 def event(kind, value="PRESS", at=(0, 0)):
     """A key, a button, a move of the mouse, or a tick of a timer."""
     return SimpleNamespace(type=kind, value=value, mouse_region_x=at[0], mouse_region_y=at[1])

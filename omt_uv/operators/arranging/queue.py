@@ -75,7 +75,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
 
     def _advance(self, context: bpy.types.Context) -> set[str]:
         """Work on the job that is on for a moment, or begin the next one."""
-        from ...solver.blas_threads import one_blas_thread
+        from ...solver.progress import take_step
 
         jobs = queue.state
         job = jobs.current if jobs is not None else None
@@ -89,8 +89,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
             steps = job.steps or job.begin(self._steps(context, obj))
             end = time.monotonic() + run.SLICE
             while time.monotonic() < end:
-                with one_blas_thread():
-                    job.progress = next(steps).fraction
+                job.progress = take_step(steps).fraction
                 if self.limit and job.seconds > self.limit:
                     job.end("FAILED", f"it took more than {self.limit:.0f} s")
                     return {"RUNNING_MODAL"}

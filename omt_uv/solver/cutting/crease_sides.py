@@ -40,7 +40,7 @@ ALL = 0.95
 MOST_SIDES = 2_000
 FEW_SIDES = 64
 # A side is a ribbon with less of the area of a disk that has as long an outline.
-NARROW = 0.2
+RIBBON = 0.2
 # A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
 # would have to be longer or shorter by the second share, and is shorter than the third: where a hole is countersunk.
 COMPACT = 0.3
@@ -157,12 +157,11 @@ def _ribbons(component: CutComponent, side: np.ndarray, border: np.ndarray) -> b
     """Whether most of a component is sides (m,) that are long and narrow, between borders (e,) bool."""
     count = int(side.max()) + 1
     area = np.bincount(side, face_areas(component.positions, component.triangles), count)
-    one, other = component.pair[border].T // 3
     tail, head = halfedges(component.triangles)
     ends = component.positions[np.stack([tail, head])[:, component.boundary]]
-    outline = sum(np.bincount(side[k], component.length[border], count) for k in (one, other))
+    outline = np.bincount(side[component.pair[border] // 3].ravel(), np.repeat(component.length[border], 2), count)
     outline += np.bincount(side[component.boundary // 3], np.linalg.norm(ends[1] - ends[0], axis=1), count)
-    return bool(area[4 * np.pi * area < NARROW * outline**2].sum() > HALF * area.sum())
+    return bool(area[4 * np.pi * area < RIBBON * outline**2].sum() > HALF * area.sum())
 
 
 def _tight(component: CutComponent, fold: np.ndarray) -> np.ndarray:

@@ -220,7 +220,8 @@ def flat_sides(chart: Chart, sharp: bool = False) -> np.ndarray:
     count = len(graph.area)
     whole = np.stack([np.bincount(graph.polygon, x, count) for x in vector.T], axis=1)
     normal = unit(whole)
-    near = np.einsum("ed,ed->e", *normal[graph.joined.T]) > np.cos(TURNED)
+    cosine = np.einsum("ed,ed->e", *normal[graph.joined.T])
+    near = cosine > np.cos(TURNED)
     side = graph.pieces(near)
     area = np.bincount(side, graph.area)
     size = np.linalg.norm(np.stack([np.bincount(side, x) for x in whole.T], axis=1), axis=1)
@@ -231,8 +232,8 @@ def flat_sides(chart: Chart, sharp: bool = False) -> np.ndarray:
         return np.zeros((0, 2), np.int64)
     unfolded = _unfolded(chart, graph, side, flat)
     if sharp:
-        fold = np.arccos(np.clip(np.einsum("ed,ed->e", *normal[graph.joined.T]), -1, 1))
-        flat &= np.bincount(side, _in_sharp_outlines(chart, graph, near | unfolded, fold > HARD), len(area)) > 0
+        in_sharp = _in_sharp_outlines(chart, graph, near | unfolded, cosine < np.cos(HARD))
+        flat &= np.bincount(side, in_sharp, len(area)) > 0
         if area[flat].sum() < MOSTLY * graph.area.sum():
             return np.zeros((0, 2), np.int64)
     return graph.ends[(one != other) & (flat[one] | flat[other]) & ~unfolded]
