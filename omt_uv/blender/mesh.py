@@ -387,5 +387,5 @@ def _items(mesh: bpy.types.Mesh, elements: np.ndarray):
 def select_culprits(context: bpy.types.Context, obj: bpy.types.Object, error: MeshError) -> None:
     """Select what an error complains about on the object, without leaving the mode."""
     if error.kind and len(error.elements):
-        context.tool_settings.mesh_select_mode = select_mode(error.kind)
+        context.scene.tool_settings.mesh_select_mode = select_mode(error.kind)
         select_elements(obj, error.kind, error.elements)

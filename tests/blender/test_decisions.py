@@ -386,8 +386,8 @@ def test_what_an_error_is_about_is_selected_and_without_elements_nothing_changes
     for polygon in obj.data.polygons:
         polygon.select = True
     error = package("solver.errors").MeshError("It is so", kind=kind, elements=elements)
-    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
     package("blender.mesh").select_culprits(bpy.context, obj, error)
     assert [p.index for p in obj.data.polygons if p.select] == selected
     shown = (False, False, True) if len(elements) and kind == "face" else (True, False, False)
-    assert tuple(bpy.context.tool_settings.mesh_select_mode) == shown
+    assert tuple(bpy.context.scene.tool_settings.mesh_select_mode) == shown

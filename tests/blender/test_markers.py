@@ -27,7 +27,7 @@ def test_picked_vertices_keep_their_order(package, picks):
     """Two are enough, of more than three those picked last are taken."""
     markers, obj = package("blender.markers"), ball()
     scenes.edit(obj, faces=[])
-    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
     mesh = bmesh.from_edit_mesh(obj.data)
     mesh.verts.ensure_lookup_table()
     for index in picks:

@@ -122,7 +122,7 @@ def test_refused_with_the_culprits_selected(make, mode):
         return
     shown = [
         name
-        for name, on in zip(("VERT", "EDGE", "FACE"), bpy.context.tool_settings.mesh_select_mode, strict=True)
+        for name, on in zip(("VERT", "EDGE", "FACE"), bpy.context.scene.tool_settings.mesh_select_mode, strict=True)
         if on
     ]
     assert shown == [kind]

@@ -256,7 +256,7 @@ def test_folded_uvs_are_refused_and_shown():
 @pytest.mark.parametrize("kind", ["SALIENCY", "GAUSSIAN", "MEAN", "SHARPNESS", "DISTANCE"])
 def test_weights(kind, mode):
     obj = scenes.bump(height=1.0)
-    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
     for sequence in (obj.data.polygons, obj.data.edges):
         sequence.foreach_set("select", [False] * len(sequence))
     for vertex in obj.data.vertices:

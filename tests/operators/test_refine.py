@@ -335,7 +335,7 @@ def test_unwrap_refuses_pins_it_cannot_keep(mode, boundary, spoil):
     text = scenes.error_of(bpy.ops.uv.omt_unwrap, boundary=boundary)
     assert ("without a fold" if spoil else boundary.lower()) in text
     assert scenes.state(obj) == before
-    assert bpy.context.tool_settings.mesh_select_mode[0]
+    assert bpy.context.scene.tool_settings.mesh_select_mode[0]
 
 
 # ---- command ------------------------------------------------------------------------------------------------

@@ -116,7 +116,7 @@ def test_picked_vertices_turn_the_globe():
     scenes.edit(obj)
     import bmesh
 
-    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
     edit = bmesh.from_edit_mesh(obj.data)
     edit.verts.ensure_lookup_table()
     for k in picks:

@@ -34,8 +34,8 @@ def select(objects):
 
 
 def export_gltf(path, **settings):
-    """Write all objects with Blender's exporter; that of 4.2 crashes now and then, as `files.export` says."""
-    bpy.context.view_layer.update()
+    """Write all objects with Blender's exporter; tool settings are read for that of 4.2, as `files.export` says."""
+    _ = bpy.context.tool_settings
     bpy.ops.export_scene.gltf(filepath=str(path), **settings)
 
 
@@ -69,7 +69,7 @@ def edit(*objects, faces=None):
         _flag(mesh, ".select_poly", "FACE", chosen)
         _flag(mesh, ".select_vert", "POINT", [v.index in vertices for v in mesh.vertices])
         _flag(mesh, ".select_edge", "EDGE", [e.key in keys for e in mesh.edges])
-    bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+    bpy.context.scene.tool_settings.mesh_select_mode = (False, False, True)
     bpy.ops.object.mode_set(mode="EDIT")
 
 

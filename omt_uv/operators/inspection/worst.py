@@ -47,7 +47,7 @@ class UV_OT_omt_worst(QuickOperator, bpy.types.Operator):
         if context.mode == "OBJECT":
             bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_all(action="DESELECT")
-        context.tool_settings.mesh_select_mode = select_mode("face")
+        context.scene.tool_settings.mesh_select_mode = select_mode("face")
         for (obj, _), faces in zip(pairs, found, strict=True):
             select_elements(obj, "face", faces)
         self.report({"INFO"}, counted(count, "Selected {} face", "Selected {} faces"))

@@ -134,7 +134,7 @@ class OBJECT_OT_omt_flow(SolverOperator, bpy.types.Operator):
             warn(self, objects, [(k, text)])
             # In Edit Mode the selection is what moves, also in the redo panel.
             if obj.mode != "EDIT":
-                context.tool_settings.mesh_select_mode = select_mode("face")
+                context.scene.tool_settings.mesh_select_mode = select_mode("face")
                 select_elements(obj, "face", faces)
 
     # ---- live ---------------------------------------------------------------------------------------------------
