@@ -72,7 +72,9 @@ def empty_scene(request):
         return
     import bpy
 
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    import scenes
+
+    scenes.open_empty()
     yield
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -46,3 +46,13 @@ def progress_bar(layout: bpy.types.UILayout, fraction: float, text: str) -> None
 
 SMOOTH_COLOUR_SHADER = "SMOOTH_COLOR" if bpy.app.version >= (4, 0, 0) else "2D_SMOOTH_COLOR"
 UNIFORM_COLOUR_SHADER = "UNIFORM_COLOR" if bpy.app.version >= (4, 0, 0) else "2D_UNIFORM_COLOR"
+
+
+def settle_context() -> None:
+    """Make sure, once a file was loaded, that the context belongs to the scene that is open.
+
+    Whoever reads the tool settings of the context of Blender 4.2 makes the scene of that time its owner. What is set of
+    its window, as readers and writers of glTF do, is told to the owner, also when this is long gone: a crash, or memory
+    that was changed, and a crash later. Read anew, they make the open scene the owner: docs/blender_4_2.md has more.
+    """
+    _ = bpy.context.tool_settings

@@ -10,7 +10,7 @@ import bpy
 import bmesh
 import numpy as np
 
-from ..blender.versions import known_options
+from ..blender.versions import known_options, settle_context
 from .in_place import glb_data, gltf
 from .meshes import AXES
 from .obj_precision import restore_precision
@@ -176,7 +176,7 @@ def _write_stl(path: Path, objects: Objects, everything: bool) -> list[str]:
 
 def _write_glb(path: Path, objects: Objects, everything: bool) -> list[str]:
     """Write a binary glTF file; returns warnings."""
-    _in_this_scene()
+    settle_context()
     if not everything:
         _select_only(objects)
     meshes = [obj.data for obj in exported_meshes(objects, everything)]
@@ -198,16 +198,6 @@ def _write_glb(path: Path, objects: Objects, everything: bool) -> list[str]:
         **options,
     )
     return []
-
-
-def _in_this_scene() -> None:
-    """Make sure that Blender 4.2 knows the scene it is in.
-
-    Whoever reads the tool settings of its context makes the scene of that time the owner of the context, and the
-    exporter of glTF, which sets the scene of the window, tells the owner, also when it is long gone: a crash. Read
-    anew, they make the owner the scene that is there now; docs/blender_4_2.md shows it without this extension.
-    """
-    _ = bpy.context.tool_settings
 
 
 def _write_gltf(path: Path, objects: Objects, everything: bool) -> list[str]:

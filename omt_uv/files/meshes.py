@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..blender.mesh import new_mesh
-from ..blender.versions import known_options
+from ..blender.versions import known_options, settle_context
 from .formats.headers import check_header
 from .formats.off import read_off
 from .ply_uvs import add_uvs
@@ -93,6 +93,7 @@ def last_line(text: str) -> str:
 def _read_blend(path: str) -> None:
     """Open a .blend file, in Object Mode, with its windows: what is not open is not saved again."""
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=True, use_scripts=False)
+    settle_context()
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 
@@ -102,6 +103,7 @@ def _reader(read: Callable[[str], object]) -> Callable[[str], None]:
 
     def run(path: str) -> None:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        settle_context()
         read(path)
 
     return run

@@ -48,7 +48,7 @@ def prepare(run, folder: Path) -> None:
     """Files for all commands: in.blend, other.blend, two.blend with two meshes, an image, handles, a folder of
     shapes and its index."""
     for name in ("in", "other"):
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        scenes.open_empty()
         body(name)
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
     body("in", at=5.0)

@@ -33,8 +33,14 @@ def select(objects):
     bpy.context.view_layer.objects.active = objects[-1] if objects else None
 
 
+def open_empty():
+    """An empty file; Blender 4.2 would hold on to a scene that is gone, see docs/blender_4_2.md."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    _ = bpy.context.tool_settings
+
+
 def export_gltf(path, **settings):
-    """Write all objects with Blender's exporter; tool settings are read for that of 4.2, as `files.export` says."""
+    """Write all objects with Blender's exporter; tool settings are read for that of 4.2, see docs/blender_4_2.md."""
     _ = bpy.context.tool_settings
     bpy.ops.export_scene.gltf(filepath=str(path), **settings)
 

@@ -106,10 +106,10 @@ def cubes(name: str, at: float):
 
 def prepare(folder: Path) -> None:
     """rich.blend with all of these, other.blend with another closed body, one.blend with a closed body alone."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes.open_empty()
     closed("Other", 0.0, 3)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "other.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes.open_empty()
     makers = {"Closed": closed, "Band": band, "Seamed": seamed, "Smooth": smooth, "Cubes": cubes}
     for k, (name, make) in enumerate(makers.items()):
         make(name, 3.0 * k)
