@@ -61,6 +61,11 @@ SPRAWLING = 0.25
 TURNS = 12
 # So many of the longest edges are tried, and of those around small sides.
 MOST_JOINED = 256
+# Triangles that turn by less, in radians, are of one flat side, if most of its area looks one way; one with fewer edges
+# around it unrolls with what is beside it.
+LEVEL = np.radians(2)
+FLAT = 0.999
+LEAST_OUTLINE = 6
 # What does not close when it is laid flat, over its extent, does not unroll.
 GAP = 0.02
 # Sides of less than this share of the area stay with what they share most of their outline with; the wall of a hole,
@@ -97,9 +102,40 @@ def hard_borders(
             continue
         component = make_component(left, positions, classes, members[k], pairs[k][pairs[k] < len(number)], free, factor)
         sides = hard_sides(component)
-        if sides is not None and not _has_clear_net(component):
+        if sides is None:
+            found[number[component.gluing_pair[cap_borders(component)]]] = True
+        elif not _has_clear_net(component):
             found[number[component.gluing_pair[side_borders(component, *sides)]]] = True
     return found
+
+
+def cap_borders(component: CutComponent) -> np.ndarray:
+    """Edges (e,) bool around the large flat sides of a component that sharp edges or bevels close off all around, as
+    the ends of a barrel are: what is no disk is cut anyway, and a cut across one would leave it in petals."""
+    fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
+    joined, count = component.pair // 3, len(component.triangles)
+    if component.vertex_count - len(joined) - len(component.boundary) + count == 1 and len(component.boundary):
+        return np.zeros(len(joined), dtype=bool)
+    level = (fold <= LEVEL) | ~np.isfinite(component.cost)
+    side = graph_components(joined[level, 0], joined[level, 1], count)[1]
+    corners = component.positions[component.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    area = np.bincount(side, np.linalg.norm(normal, axis=1))
+    whole = np.linalg.norm([np.bincount(side, x) for x in normal.T], axis=0)
+    pair = side[joined]
+    border = pair[:, 0] != pair[:, 1]
+    pair, length = pair[border], component.length[border]
+    sharp = ((fold > HARD) | _tight(component, fold))[border]
+
+    def around(amount: np.ndarray) -> np.ndarray:
+        return np.bincount(pair.ravel(), np.repeat(amount, 2), len(area))
+
+    cap = (area >= LARGE * area.sum()) & (whole >= FLAT * area) & (around(np.ones(len(pair))) >= LEAST_OUTLINE)
+    cap &= around(length * sharp) >= ALL * around(length)
+    # The sides of a beam end at one another.
+    cap &= around(length * cap[pair].all(axis=1)) < HALF * around(length)
+    border[border] = cap[pair].any(axis=1)
+    return border
 
 
 def _has_clear_net(component: CutComponent) -> bool:

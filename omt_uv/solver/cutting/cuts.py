@@ -44,6 +44,8 @@ STEEPER_OUTLINED = 1.5
 UNSEEN = 0.1**2
 # A net may be so many times as long as another cut, and as long as `developable_nets.Net.most` says anyway.
 LONGER = 1.5
+# Of what has a boundary a net with slits to more vertices is a comb, as along the bevel of a rim.
+COMBED = 12
 
 
 class SeamFinder(Protocol):
@@ -316,7 +318,7 @@ class _Cutter:
         again = searched and self.search is not None and self.search.is_again
         unrolled = net(component) if (self.extremities or searched) and not (filled or again) else None
         found = None if unrolled is None else unrolled.up_to(unrolled.most)
-        if found is not None:
+        if found is not None and not (searched and topology.boundaries[k] and len(found.tips) > COMBED):
             return found.cut, found.tips
         if searched and self.search is not None:
             return (yield from self._search_component(component, topology, k, self.search))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.crease_sides import _part_covered, hard_sides, lone_edges, side_borders
+from omt_uv.solver.cutting.crease_sides import _part_covered, cap_borders, hard_sides, lone_edges, side_borders
 from omt_uv.solver.mesh.surface import Surface, triangle_surface
 from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -228,14 +228,50 @@ def test_the_number_of_segments_of_an_arc_does_not_make_it_a_bevel():
     assert counts[0] == counts[1] == 5
 
 
+def lathed(profile, sectors):
+    """A closed body: a profile (k,2) of radius and height, turned about the axis, between level ends."""
+    k, at = len(profile), np.arange(sectors)
+    V, Q = turned(profile, sectors)
+    ends = [np.stack([at * k + j, (at + 1) % sectors * k + j], axis=1) for j in (0, k - 1)]
+    fans = [np.column_stack([e if j else e[:, ::-1], np.full(sectors, len(V) + j)]) for j, e in enumerate(ends)]
+    middles = [[0.0, 0.0, profile[j][1]] for j in (0, -1)]
+    return np.concatenate([V, middles]), np.concatenate([triangles_of(Q[np.arange(len(Q)) % k < k - 1]), *fans])
+
+
 def barrel(waist, slope, sectors):
     """Two cones that meet in a crease, between level ends: an edge around the ends folds by 90 degrees - slope."""
     c, s = np.cos(np.radians(slope)), np.sin(np.radians(slope))
-    V, Q = turned([(waist - s, 0.0), (waist, c), (waist - s, 2 * c)], sectors)
-    ends = [np.stack([np.arange(sectors) * 3 + j, (np.arange(sectors) + 1) % sectors * 3 + j], axis=1) for j in (0, 2)]
-    fans = [np.column_stack([e if j else e[:, ::-1], np.full(sectors, len(V) + j)]) for j, e in enumerate(ends)]
-    walls = Q[np.arange(len(Q)) % 3 < 2]
-    return np.concatenate([V, [[0, 0, 0], [0, 0, 2 * c]]]), np.concatenate([triangles_of(walls), *fans])
+    return lathed([(waist - s, 0.0), (waist, c), (waist - s, 2 * c)], sectors)
+
+
+# A column whose ends flare; the same with a narrow bevel around its ends.
+COLUMN = [(0.6, 0.0), (0.6, 0.1), (0.5, 0.2), (0.44, 0.3), (0.4, 2.0), (0.44, 2.3), (0.5, 2.4), (0.6, 2.5), (0.6, 2.6)]
+BEVELLED = [(0.58, 0.0), (0.595, 0.005), *COLUMN[1:-1], (0.595, 2.595), (0.58, 2.6)]
+
+
+@pytest.mark.parametrize("profile", [COLUMN, BEVELLED])
+def test_the_ends_of_a_column_come_off_whole(profile):
+    V, F = lathed(profile, 24)
+    component = component_of(V, F)
+    assert hard_sides(component) is None
+    border = cap_borders(component)
+    size = np.sort(np.bincount(sides(component, border)))
+    assert size.tolist() == [24, 24, len(F) - 48] and border.sum() == 48
+    found, _ = shear_of(triangle_surface(V, F))
+    # Two discs and a wall: no disc is cut.
+    assert sorted(len(chart.triangles) for chart in found.charts) == size.tolist()
+    assert [len(chart.vertices) for chart in found.charts].count(25) == 2
+
+
+def test_sides_that_go_on_are_no_caps():
+    ends_smoothly = lathed([(0.3, 0.0), (0.5, 0.06), (0.6, 0.2), (0.6, 2.0), (0.5, 2.14), (0.3, 2.2)], 24)
+    V, F = lathed(COLUMN, 24)
+    lid = V, F[:-24]  # without one end it is a disk
+    for mesh in (ends_smoothly, lid, meshes.cube(), meshes.head(), meshes.torus(24, 8)):
+        assert not cap_borders(component_of(*mesh)).any()
+    beam = lathed([(0.1, z) for z in np.linspace(0, 1, 12)], 8)
+    # The facets of a beam are flat, and end at one another: its ends alone come off.
+    assert cap_borders(component_of(*beam)).sum() == 16
 
 
 def test_a_body_of_few_sides_that_unroll_comes_apart_though_some_meet_bluntly():
@@ -325,3 +361,15 @@ def test_what_has_a_marked_seam_does_not_come_apart():
     marked = np.stack([ring, np.roll(ring, -1)], axis=1)
     found = drain(unwrap(surface_of(V, Q, marked), options=UnwrapOptions(max_shear=1.35)))
     assert len(found.charts) == 1
+
+
+def test_the_bevel_of_a_rim_is_not_combed():
+    """A cylinder with rounded rims: the wall and its bevels are one strip, that no slit leads into."""
+    turn = np.linspace(0, np.pi / 2, 4)
+    rim = np.column_stack([0.9 + 0.1 * np.cos(turn), 0.1 * np.sin(turn)])
+    profile = [*(rim[::-1] * [1, -1] + [0, 0.1]), *(rim + [0, 1.9])]
+    V, F = lathed(profile, 32)
+    found, shear = shear_of(triangle_surface(V, F))
+    assert len(found.charts) == 3 and shear < 1.03
+    wall = max(found.charts, key=lambda chart: len(chart.triangles))
+    assert len(wall.vertices) == 33 * len(profile)
