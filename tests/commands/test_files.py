@@ -103,9 +103,9 @@ def test_round_trip_keeps_coordinates_and_order(package, run, tmp_path, source, 
 def test_gltf_is_written_after_tool_settings_of_a_scene_that_is_gone_were_read(package, tmp_path):
     """Blender 4.2 takes that scene for the owner of its window, see docs/blender_4_2.md."""
     export = package("files.export").export
-    for _ in range(40):
+    for _ in range(80):
         _ = bpy.context.tool_settings
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         obj = scenes.bump(2, 2)
         for k in range(300):
             bpy.data.meshes.new(str(k))  # takes the memory of the scene that is gone

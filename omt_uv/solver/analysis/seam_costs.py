@@ -48,6 +48,7 @@ CHANCE = NEAR / 2
 IN_FACE = 0.5
 # Triangles that pair up to quads across their longest sides, of all: so many come from quads and not by chance.
 PAIRED = 0.9
+EQUAL = 1 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -248,8 +249,11 @@ def _sides_of_quads(positions: np.ndarray, triangles: np.ndarray, owner: np.ndar
     sizes = np.bincount(owner)[owner]
     if (sizes == 1).all():
         first, second = pair_up(every)
-        longest = halfedge_lengths(positions, triangles).reshape(-1, 3).argmax(axis=1)
-        pairs = (longest[first // 3] == first % 3) & (longest[second // 3] == second % 3)
+        length = halfedge_lengths(positions, triangles).reshape(-1, 3)
+        longest = length >= EQUAL * length.max(axis=1, keepdims=True)
+        # Of two sides that are equally long rounding would choose.
+        longest = (longest & (longest.sum(axis=1) == 1)[:, None]).ravel()
+        pairs = longest[first] & longest[second]
         from_quads = 2 * pairs.sum() >= PAIRED * len(triangles)
         return (~np.isin(keys, every[first[pairs]])).astype(float) if from_quads else np.zeros(len(keys))
     return (~np.isin(keys, every[np.repeat(sizes != 2, 3)])).astype(float)

@@ -44,7 +44,7 @@ STEEPER_OUTLINED = 1.5
 UNSEEN = 0.1**2
 # A net may be so many times as long as another cut, and as long as `developable_nets.Net.most` says anyway.
 LONGER = 1.5
-# Of what has a boundary a net with slits to more vertices is a comb, as along the bevel of a rim.
+# Of what has a boundary a net with slits to more vertices is a comb, as along the bevel of an end.
 COMBED = 12
 
 

