@@ -44,8 +44,6 @@ STEEPER_OUTLINED = 1.5
 UNSEEN = 0.1**2
 # A net may be so many times as long as another cut, and as long as `developable_nets.Net.most` says anyway.
 LONGER = 1.5
-# Of what has a boundary a net with slits to more vertices is a comb, as along the bevel of an end.
-COMBED = 12
 
 
 class SeamFinder(Protocol):
@@ -318,7 +316,8 @@ class _Cutter:
         again = searched and self.search is not None and self.search.is_again
         unrolled = net(component) if (self.extremities or searched) and not (filled or again) else None
         found = None if unrolled is None else unrolled.up_to(unrolled.most)
-        if found is not None and not (searched and topology.boundaries[k] and len(found.tips) > COMBED):
+        bounded = searched and topology.boundaries[k] > 0
+        if found is not None and not (bounded and found.is_comb(_needed(component, topology, k))):
             return found.cut, found.tips
         if searched and self.search is not None:
             return (yield from self._search_component(component, topology, k, self.search))
@@ -342,6 +341,11 @@ class _Cutter:
         if closed and chosen.sum() < 2:
             return cut_component(component, topology, k, self.extremities)
         return chosen, _tips(component, chosen)
+
+
+def _needed(component: CutComponent, topology: Topology, k: int) -> float:
+    """The length of what has to be cut for a disk anyway."""
+    return 0.0 if topology.is_disk[k] else float(component.length[cut_component(component, topology, k, 0)[0]].sum())
 
 
 def _tips(component: CutComponent, chosen: np.ndarray) -> np.ndarray:

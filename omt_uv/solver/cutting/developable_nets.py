@@ -46,6 +46,9 @@ COVERED = 1e-3
 MUCH = 2e-2
 # Edges within flat or developable sides count so many times, which leaves these in one component.
 ACROSS = 1.5
+# A net to more corners whose slits are longer, next to the side of a square with the area of the surface, is a comb.
+TEETH = 12
+LONG_TEETH = 1.0
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,12 @@ class Net:
         # Nets that do not lie on themselves are looked for where one of them may be taken.
         found = self.spread_out() if self.length <= length else self
         return found if found.length <= length else None
+
+    def is_comb(self, needed: float) -> bool:
+        """Whether this net is a slit at every segment of a band, as along the bevel of an end: to many vertices, and
+        long beyond the length that is needed anyway. Around the corners of a lid slits are short."""
+        side = float(np.sqrt(face_areas(self.component.positions, self.component.triangles).sum()))
+        return len(self.tips) > TEETH and self.length - needed > LONG_TEETH * side
 
     def spread_out(self) -> Net:
         """This net or, where the component laid flat along it lies on itself, the shortest of some others along which

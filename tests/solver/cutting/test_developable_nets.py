@@ -23,6 +23,14 @@ def test_a_cube_has_a_net_of_seven_edges():
     assert replace(found, cut=np.ones(len(component.pair), bool)).up_to(found.most) is None
 
 
+def test_many_long_slits_are_a_comb():
+    found = net(component_of(*meshes.cube()))
+    side = np.sqrt(6)
+    many = replace(found, tips=np.arange(13))
+    assert many.is_comb(7 - 1.01 * side) and not many.is_comb(7 - 0.99 * side)
+    assert not replace(found, tips=np.arange(12)).is_comb(0.0)
+
+
 def test_a_net_leaves_no_curvature_inside():
     V, F = meshes.cube()
     component = component_of(*meshes.subdivide(V * [1, 2, 3], F))
