@@ -66,6 +66,8 @@ MOST_JOINED = 256
 LEVEL = np.radians(2)
 FLAT = 0.999
 LEAST_OUTLINE = 6
+# An edge closes it off that folds by more: prisms of ten sides do, chamfers too, and bodies of twelve are smooth.
+CLOSED = np.radians(33)
 # What does not close when it is laid flat, over its extent, does not unroll.
 GAP = 0.02
 # Sides of less than this share of the area stay with what they share most of their outline with; the wall of a hole,
@@ -125,7 +127,7 @@ def cap_borders(component: CutComponent) -> np.ndarray:
     pair = side[joined]
     border = pair[:, 0] != pair[:, 1]
     pair, length = pair[border], component.length[border]
-    sharp = ((fold > HARD) | _tight(component, fold))[border]
+    sharp = ((fold > CLOSED) | _tight(component, fold))[border]
 
     def around(amount: np.ndarray) -> np.ndarray:
         return np.bincount(pair.ravel(), np.repeat(amount, 2), len(area))

@@ -24,6 +24,8 @@ from .shear_search import MARGIN, MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, S
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
+# After so many rounds one that is hardly better than the one before is the last.
+TRIED = 2
 # What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
 CROWDED = 1.35
 # After a second search, what lies on itself comes apart where that leaves this share of what is missing at most.
@@ -108,7 +110,7 @@ def bound_shear(
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
                 return _result(spared, search, first.warnings, early)
-        is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
+        is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
         parting = _apart(search, last, crossing, rounds, worse)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):

@@ -269,9 +269,13 @@ def test_sides_that_go_on_are_no_caps():
     lid = V, F[:-24]  # without one end it is a disk
     for mesh in (ends_smoothly, lid, meshes.cube(), meshes.head(), meshes.torus(24, 8)):
         assert not cap_borders(component_of(*mesh)).any()
-    beam = lathed([(0.1, z) for z in np.linspace(0, 1, 12)], 8)
-    # The facets of a beam are flat, and end at one another: its ends alone come off.
-    assert cap_borders(component_of(*beam)).sum() == 16
+
+
+@pytest.mark.parametrize(("sectors", "ends"), [(8, 0), (12, 24)])
+def test_the_facets_of_a_beam_end_at_one_another(sectors, ends):
+    """Those of eight are flat sides between sharp edges; twelve go round, between two ends."""
+    beam = lathed([(0.1, z) for z in np.linspace(0, 1, 12)], sectors)
+    assert cap_borders(component_of(*beam)).sum() == ends
 
 
 def test_a_body_of_few_sides_that_unroll_comes_apart_though_some_meet_bluntly():
