@@ -2,7 +2,8 @@
 
     python scripts/pictures/hard_plate.py [OUT.png]
 
-A flange, a nut, a bracket and a crate, cut out of cubes and cylinders, with bevels but for the nut.
+A flange, a nut, a bracket and a crate, cut out of cubes and cylinders, with bevels but for the nut; a barrel and a
+wheel, turned about their axes.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import bpy
 
+import bmesh
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -89,12 +91,45 @@ def crate():
     return bevelled(cut(body, cube(1, 0, 0, scale=(0.5, 0.5, 0.5)), "UNION"), 0.04)
 
 
-BODIES = {"flange": flange, "nut": nut, "bracket": bracket, "crate": crate}
+def turned(profile, sectors=32, ring=False):
+    """A profile of radii and heights turned about Z, a ring where it is closed."""
+    edit = bmesh.new()
+    vertices = [edit.verts.new((radius, 0, height)) for radius, height in profile]
+    for k in range(len(vertices) - (not ring)):
+        edit.edges.new((vertices[k], vertices[(k + 1) % len(vertices)]))
+    whole = {"geom": edit.verts[:] + edit.edges[:], "axis": (0, 0, 1), "cent": (0, 0, 0), "angle": 2 * np.pi}
+    bmesh.ops.spin(edit, steps=sectors, use_merge=False, **whole)
+    bmesh.ops.remove_doubles(edit, verts=edit.verts[:], dist=1e-5)
+    bmesh.ops.recalc_face_normals(edit, faces=edit.faces[:])
+    mesh = bpy.data.meshes.new("turned")
+    edit.to_mesh(mesh)
+    edit.free()
+    body = bpy.data.objects.new("turned", mesh)
+    bpy.context.scene.collection.objects.link(body)
+    bpy.context.view_layer.objects.active = body
+    return body
+
+
+def barrel():
+    """Staves between two ends."""
+    return bevelled(turned([(0, -0.7), (0.5, -0.7), (0.6, -0.25), (0.62, 0), (0.6, 0.25), (0.5, 0.7), (0, 0.7)]), 0.02)
+
+
+def wheel():
+    """A tyre, its edges rounded."""
+    return bevelled(
+        turned([(0.6, -0.25), (0.95, -0.3), (1, -0.25), (1, 0.25), (0.95, 0.3), (0.6, 0.25)], ring=True), 0.03
+    )
+
+
+BODIES = {"flange": flange, "nut": nut, "bracket": bracket, "crate": crate, "barrel": barrel, "wheel": wheel}
 VIEWS = {
     "flange": renders.View("Z", 30, -40),
     "nut": renders.View("Z", 30, 35),
     "bracket": renders.View("Z", 50, 25),
     "crate": renders.View("Z", 50, 35),
+    "barrel": renders.View("Z", 35, 25),
+    "wheel": renders.View("Z", 35, 50),
 }
 
 

@@ -234,7 +234,7 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
 
 
 def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
-    """A round within the bound with shorter cuts, where rehearsals had asked for more than maps needed, if these keep
+    """A round within the bound with shorter cuts, where searches had asked for more than maps needed, if these keep
     the bound, too; as it is otherwise."""
     longer = [k for k in range(len(last.charts)) if last.has_slack(k)]
     if not longer:

@@ -297,8 +297,8 @@ class Round:
         return float(MARGIN * np.log(self.bound) ** 2 / np.log(self.pressing[k]) ** 2)
 
     def has_slack(self, k: int) -> bool:
-        """Whether chart k, as it was rehearsed, shears so much less than the bound that a shorter cut may do."""
-        return bool(self.has_room[k]) and any(one.rehearsed is not None for one in self.found_for(k))
+        """Whether chart k, whose seams were searched, shears so much less than the bound that shorter ones may do."""
+        return bool(self.has_room[k]) and bool(self.found_for(k))
 
     @property
     def missing(self) -> np.ndarray:

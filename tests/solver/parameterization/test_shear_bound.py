@@ -12,7 +12,7 @@ from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, FoldedUVError
 from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.geometry import edge_lengths, face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import shear_bound, shear_search
@@ -421,3 +421,25 @@ def test_a_search_that_can_map_nothing_rehearses_nothing():
     surface = triangle_surface(*meshes.grid(4, 4))
     search = shear_search.ShearSearch(surface, None, ShearBound(1.2), None, {})
     assert drain(search.rehearsed(surface, None)) is None
+
+
+def test_a_small_sphere_is_cut_no_more_than_it_needs():
+    """Of 512 quads: the first search goes on to shear of 1.17 with seams half as long again."""
+    across, down = 32, 15
+    polar, turn = np.pi * np.arange(1, down + 1) / (down + 1), 2 * np.pi * np.arange(across) / across
+    ring = [
+        np.outer(np.sin(polar), np.cos(turn)),
+        np.outer(np.sin(polar), np.sin(turn)),
+        np.repeat(np.cos(polar), across),
+    ]
+    V = np.concatenate([np.stack([np.ravel(x) for x in ring], axis=1), [[0, 0, 1], [0, 0, -1]]])
+    k, j = np.divmod(np.arange(across * (down - 1)), across)
+    quads = np.stack(
+        [k * across + j, (k + 1) * across + j, (k + 1) * across + (j + 1) % across, k * across + (j + 1) % across]
+    )
+    j, last, top = np.arange(across), across * (down - 1), len(V) - 2
+    ends = [[top, a, (a + 1) % across] for a in j] + [[top + 1, last + (a + 1) % across, last + a] for a in j]
+    surface = meshes.polygon_surface(V, [*quads.T.tolist(), *ends])
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
+    assert len(found.charts) == 1 and 1.2 < found.maps[0].angle_mean < 1.35
+    assert edge_lengths(V, found.seams).sum() < 2.3 * np.sqrt(4 * np.pi)
