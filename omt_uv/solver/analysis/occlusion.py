@@ -81,10 +81,21 @@ def looks_out(hidden: np.ndarray, area: np.ndarray, part: np.ndarray) -> np.ndar
     return back - front > CLEARLY * np.bincount(part, area)
 
 
-def vertex_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Mean (n,) of `face_occlusion` over the triangles (m,3) around every vertex (n,3), 0 for those of none."""
-    hidden = face_occlusion(positions, triangles)
+def outside_out(positions: np.ndarray, triangles: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+    """Triangles (m,3), those of parts turned over that clearly look inwards; hidden (2,m) : see `hidden_sides`."""
+    part = _parts(triangles, len(positions))
+    inward = looks_out(hidden[::-1], face_areas(unit_size(positions, triangles), triangles), part)[part]
+    return np.where(inward[:, None], triangles[:, [0, 2, 1]], triangles)
+
+
+def vertex_occlusion(positions: np.ndarray, triangles: np.ndarray, sides: np.ndarray | None = None) -> np.ndarray:
+    """Mean (n,) of `face_occlusion` over the triangles (m,3) around every vertex (n,3), 0 for those of none.
+
+    sides (2,m) : what `hidden_sides` gives, where it is known
+    """
+    sides = hidden_sides(positions, triangles) if sides is None else sides
     area = np.maximum(face_areas(unit_size(positions, triangles), triangles), np.finfo(float).tiny)
+    hidden = _outer(sides, area, triangles, len(positions))
     around = np.bincount(triangles.ravel(), np.repeat(area, 3), len(positions))
     total = np.bincount(triangles.ravel(), np.repeat(area * hidden, 3), len(positions))
     return total / np.where(around > 0, around, 1)
@@ -122,8 +133,11 @@ def _visible(seen: np.ndarray, slant: np.ndarray, owner: np.ndarray) -> tuple[np
 
 def _outer(hidden: np.ndarray, area: np.ndarray, triangles: np.ndarray, n: int) -> np.ndarray:
     """Of (2,m) the row, by component, that is less hidden in the mean over the areas (m,)."""
-    tail, head = halfedges(triangles)
-    count, label = graph_components(tail, head, n)
-    label = label[triangles[:, 0]]
-    mean = np.stack([np.bincount(label, area * h, count) for h in hidden])
+    label = _parts(triangles, n)
+    mean = np.stack([np.bincount(label, area * h) for h in hidden])
     return hidden[(mean[1] < mean[0]).astype(int)[label], np.arange(len(area))]
+
+
+def _parts(triangles: np.ndarray, n: int) -> np.ndarray:
+    """The number (m,) of the connected part that each triangle (m,3) of n vertices is in."""
+    return graph_components(*halfedges(triangles), n)[1][triangles[:, 0]]

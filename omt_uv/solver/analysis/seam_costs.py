@@ -17,7 +17,7 @@ from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import halfedges, pair_keys, pair_up, paired
 from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards, with_a_face
 from .feature_edges import fold_angles
-from .occlusion import vertex_occlusion
+from .occlusion import hidden_sides, outside_out, vertex_occlusion
 from .order_of_places import order_of_places
 from .saliency import curvature_means, saliency_of, unit_size
 from .symmetry_plane import NEAR, SymmetryPlane, symmetry_plane
@@ -190,10 +190,13 @@ def _vertex_reasons(
 ) -> tuple[Facing, dict[str, np.ndarray]]:
     """Where a surface of unit size looks to, and what speaks for and against its vertices, (n,) each in [0, 1]."""
     n, area = len(positions), vertex_areas(positions, triangles)
+    sides = hidden_sides(positions, triangles)
+    # The front of a body that is inside out is its front all the same.
+    triangles = outside_out(positions, triangles, sides)
     means = curvature_means(positions, triangles)
     saliency = saliency_of(means, triangles)
     seen = facing(positions, triangles, saliency, plane, axes)
-    occlusion = vertex_occlusion(positions, triangles)
+    occlusion = vertex_occlusion(positions, triangles, sides)
     sure = seen.certainty * with_a_face(positions, triangles, seen)
     forwards = sure * towards(positions, triangles, seen.front)
     below = towards(positions, triangles, -seen.up)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis import seam_costs as seam_costs_module
-from omt_uv.solver.analysis.facing import SceneAxes
+from omt_uv.solver.analysis.facing import Z_UP, SceneAxes
 from omt_uv.solver.analysis.seam_costs import LEAST, MOST, SeamPreferences, seam_costs
 from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane
 from omt_uv.solver.errors import ZeroAreaFaceError
@@ -127,3 +127,10 @@ def test_what_is_only_about_the_same_above_and_below_has_no_mirror(monkeypatch, 
     assert (seam_costs(surface, SeamPreferences(axes=SceneAxes())).plane is None) == chance
     # Where nobody knows what is up, nothing is level.
     assert seam_costs(surface, SeamPreferences()).plane is not None
+
+
+def test_a_body_that_is_inside_out_costs_what_it_costs_otherwise():
+    for V, F in (meshes.head(), meshes.cap(rings=12, sectors=24)):
+        out, inside = (seam_costs(triangle_surface(V, f), SeamPreferences(axes=Z_UP)) for f in (F, F[:, ::-1]))
+        np.testing.assert_allclose(inside.cost, out.cost, atol=1e-9)
+        assert np.ptp(out.reasons["underside"]) > 0.5 and np.array_equal(inside.in_face, out.in_face)
