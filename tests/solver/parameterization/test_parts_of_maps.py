@@ -1,0 +1,741 @@
+"""Parts of what maps charts, and what they decide, one by one."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.cutting.cuts import Cuts
+from omt_uv.solver.errors import MeshError, PinError
+from omt_uv.solver.mesh.charts import Chart
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
+from omt_uv.solver.parameterization import (
+    chart_indices,
+    convex_maps,
+    convexity,
+    initial_map,
+    mirrored_charts,
+    polygon_disk,
+    shear_bound,
+    shear_search,
+    small_charts,
+)
+from omt_uv.solver.parameterization.chart_map import FOLDED, ChartMap
+from omt_uv.solver.parameterization.options import MapOptions, ShearBound, UnwrapOptions
+from omt_uv.solver.progress import EarlyEnd, RunLog, drain
+from omt_uv.solver.refinement import batch_refine
+
+
+def chart_of(V, F, faces=None, ids=None):
+    """A chart of triangles with corners of its own."""
+    faces = np.arange(len(F)) if faces is None else np.asarray(faces)
+    ids = np.arange(len(V)) if ids is None else np.asarray(ids)
+    return Chart(V, F, np.arange(F.size).reshape(-1, 3), faces, ids)
+
+
+def cuts_of(edges):
+    """Cuts along edges, each of length 1."""
+    edges = np.array(edges, np.int64).reshape(-1, 2)
+    return Cuts(edges, float(len(edges)), (), edges[:0], ())
+
+
+def map_of(uv, **given):
+    """A map with these figures."""
+    return ChartMap(uv=uv, **{"area_l1": 0.01, "area_sd": 0.01, "angle_mean": 1.1, "folds": 0} | given)
+
+
+def steps_of(value):
+    def steps(*_, **__):
+        return value
+        yield
+
+    return steps
+
+
+# Rounds of a search for a bound of the shear.
+
+
+def round_of(areas, means, pressing=None, searched=None, memory=None, charts=None, maps=None, bound=1.35, edges=()):
+    means = np.array(means, float)
+    pressing = means if pressing is None else np.array(pressing, float)
+    areas = np.array(areas, float)
+    searched = np.flatnonzero(pressing > bound).tolist() if searched is None else searched
+    charts = charts or [SimpleNamespace(faces=np.array([k])) for k in range(len(areas))]
+    maps = maps or [SimpleNamespace(failure=None) for _ in areas]
+    cuts = cuts_of(edges)
+    return shear_search.Round(charts, maps, cuts, memory or {}, areas, means, pressing, bound, searched)
+
+
+def test_what_is_missing_is_the_excess_times_the_area_of_what_is_searched():
+    one = round_of([1, 2, 5], [1.3, 1.55, 1.95], searched=[1])
+    np.testing.assert_allclose(one.missing, [0, 2 * 0.2, 0])
+    assert one.excess == pytest.approx(0.4 / 8)
+
+
+@pytest.mark.parametrize("now, then, hardly", [
+    ([1.60], [1.61], True),
+    ([1.36], [1.61], False),
+    ([1.60], [1.90], False),
+    ([1.358], [1.359], False),
+])  # fmt: skip
+def test_a_round_is_hardly_better_where_as_much_misses_the_bound_by_much(now, then, hardly):
+    assert round_of([1], now).is_hardly_better(round_of([1], then)) == hardly
+
+
+def test_a_round_in_which_more_area_keeps_the_bound_is_better():
+    # The same excess, on half of the area.
+    assert not round_of([1, 1], [1.2, 1.85]).is_hardly_better(round_of([1, 1], [1.6, 1.6]))
+
+
+@pytest.mark.parametrize("mean, steep, pressing", [
+    (1.2, 0.0, 1.2), (1.2, 0.01, 1.2), (1.2, 0.02, 1.5 * 1.02), (1.0, 0.5, 1.0), (1.9, 0.5, 1.5 * 1.5), (3.0, 0.5, 3.0),
+])  # fmt: skip
+def test_what_is_steep_presses_as_if_the_mean_missed_the_bound(mean, steep, pressing):
+    assert shear_search.pressing_shear(mean, steep, 1.5) == pytest.approx(pressing)
+
+
+def test_charts_have_room_below_most_of_the_squared_logarithm():
+    bound = 1.35
+    shears = [np.exp(np.sqrt(share) * np.log(bound)) for share in (0.84, 0.86, 1.2)]
+    assert round_of([1] * 4, [*shears, 1.0]).has_room.tolist() == [True, False, False, False]
+
+
+def test_what_is_allowed_is_the_bound_over_what_there_is():
+    one = round_of([1], [1.1])
+    assert one.share_allowed(0) == pytest.approx(0.95 * np.log(1.35) ** 2 / np.log(1.1) ** 2)
+
+
+@pytest.mark.parametrize("rehearsed, mean, slack", [(1.0, 1.1, True), (None, 1.1, False), (1.0, 1.34, False)])
+def test_slack_is_where_a_rehearsal_asked_for_more_than_the_map_needs(rehearsed, mean, slack):
+    memory = {"it": SimpleNamespace(polygons=np.array([0]), rehearsed=rehearsed)}
+    assert round_of([1], [mean], memory=memory).has_slack(0) == slack
+    other = {"it": SimpleNamespace(polygons=np.array([0, 1]), rehearsed=rehearsed)}
+    assert not round_of([1, 1], [mean, 1.0], memory=other).has_slack(0)
+
+
+def test_what_came_apart_or_is_stuck_is_not_searched_again():
+    memory = {k: SimpleNamespace(polygons=np.array([k]), is_stuck=k == 1) for k in range(4)}
+    one = round_of([1] * 4, [1.5] * 4, memory=memory)
+    assert one.to_be_searched({2: np.zeros((1, 2))}) == [0, 3]
+
+
+def test_shares_ask_for_what_is_left_and_for_what_was_promised_and_not_kept():
+    maps = [SimpleNamespace(failure=None), SimpleNamespace(failure="none"), SimpleNamespace(failure=None)]
+    charts = [
+        SimpleNamespace(faces=np.array([0, 1])),
+        SimpleNamespace(faces=np.array([2])),
+        SimpleNamespace(faces=np.array([3])),
+    ]
+    one = round_of([1] * 3, [1.6, 1.0, 1.5], charts=charts, maps=maps)
+    share, promised = one.shares([0, 1], np.full(4, np.inf), 0.9)
+    reached, bound = np.log(1.6) ** 2, np.log(1.35) ** 2
+    np.testing.assert_allclose(share, [0.9 * bound / reached] * 2 + [0.5, 1.0])
+    np.testing.assert_allclose(promised, [0.9 * bound] * 2 + [np.inf] * 2)
+    again, after = one.shares([0], promised, 1.0)
+    np.testing.assert_allclose(again[:2], 0.9 * bound / reached * bound / reached)
+    np.testing.assert_allclose(after[:2], again[:2] * reached)
+    assert again[2] == 1
+
+
+def test_outlines_are_as_long_as_the_edges_around_both_sides_of_a_slit():
+    V, F = meshes.grid(3, 2)
+    one = round_of([1, 1], [1, 1], charts=[chart_of(V, F), chart_of(2 * V, F[:1])])
+    p = 2 * V[F[0]]
+    np.testing.assert_allclose(one.outline_length, [4, sum(np.linalg.norm(p[k] - p[k - 1]) for k in range(3))])
+
+
+def search_of(**given):
+    fields = {"surface": SimpleNamespace(face_start=np.arange(0, 31, 3)), "faces": None, "shear": ShearBound(1.35),
+              "target": None, "cutting": {}}  # fmt: skip
+    return shear_search.ShearSearch(**fields | given)
+
+
+def test_a_first_spread_goes_with_the_bound():
+    found = search_of().first_spread()
+    assert found.shape == (10,)
+    np.testing.assert_allclose(found, 0.19 * np.log(1.35) ** 2)
+
+
+@pytest.mark.parametrize("bound, rehearses", [(1.19, False), (1.2, True), (1.5, True)])
+def test_searches_are_rehearsed_from_a_bound_on(bound, rehearses):
+    found = search_of(shear=ShearBound(bound, True)).search(np.zeros(10))
+    assert (found.rehearse is not None) == rehearses and found.further
+    assert found.asked == pytest.approx(np.log(bound) ** 2)
+
+
+def test_twins_are_found_by_the_images_of_all_vertices():
+    image = np.array([3, 4, 5, 0, 1, 2, 6])
+    charts = [SimpleNamespace(vertex_ids=np.array(x)) for x in ([2, 0, 1], [0, 1, 6], [5, 4, 3], [3, 4, 6], [6])]
+    search = search_of()
+    search.__dict__["images"] = SimpleNamespace(exact=image, are_exact=True)
+    assert search._twins(charts).tolist() == [-1, -1, 0, 1, -1]
+    assert search._twins(charts[:1]).tolist() == [-1]
+    search.__dict__["images"] = SimpleNamespace(exact=image, are_exact=False)
+    assert search._twins(charts).tolist() == [-1] * 5
+    search.__dict__["images"] = None
+    assert search._twins(charts).tolist() == [-1] * 5
+
+
+def test_only_one_of_two_twins_is_searched_and_both_are_cut(monkeypatch):
+    asked = []
+
+    def cut(self, kept, search):
+        asked.append((kept.tolist(), search.spread.copy()))
+        edges = [[0, 1], [2, 9]] if len(asked) == 1 else [[7, 8]]
+        cuts = cuts_of(edges)
+        return SimpleNamespace(found_cuts=cuts, cuts=cuts)
+        yield
+
+    monkeypatch.setattr(shear_search.ShearSearch, "_cut", cut)
+    monkeypatch.setattr(shear_search, "replace", lambda one, **changes: SimpleNamespace(**{**vars(one), **changes}))
+    monkeypatch.setattr(shear_search.ShearSearch, "search", lambda self, spread: SimpleNamespace(spread=spread))
+    search = search_of()
+    search.__dict__["images"] = SimpleNamespace(exact=np.array([3, 4, 5, 0, 1, 2, 6, 7, 8, 9]), are_exact=True)
+    charts = [SimpleNamespace(vertex_ids=np.array([0, 1, 2]), faces=np.array([0, 1])),
+              SimpleNamespace(vertex_ids=np.array([3, 4, 5]), faces=np.array([2, 3]))]  # fmt: skip
+    found = drain(search.again(np.array([[8, 9]]), charts, np.arange(10.0), {}))
+    np.testing.assert_array_equal(asked[0][1], [0, 1] + [np.inf] * 8)
+    assert asked[1][0] == [[8, 9], [0, 1], [2, 9], [3, 4]] and np.isinf(asked[1][1]).all()
+    assert found.cuts.edges.tolist() == [[0, 1], [2, 9], [3, 4], [7, 8]]
+
+
+@pytest.mark.parametrize("mean, late, rounds, may", [
+    (1.35 * 1.011, True, 1, True), (1.35 * 1.009, True, 1, False), (1.35 * 1.011, False, 1, False),
+    (1.35**1.17, False, 1, True), (1.35**1.15, False, 1, False), (1.0, False, 3, True), (1.0, False, 2, False),
+])  # fmt: skip
+def test_charts_may_cross_themselves_where_they_miss_the_bound_by_much_or_late(mean, late, rounds, may):
+    assert shear_bound._may_cross(round_of([1], [mean]), 0, late, rounds) == may
+
+
+@pytest.mark.parametrize("pressing, sparing, after, taken", [
+    (1.35 * 1.04, True, 1.3, True), (1.35 * 1.06, True, 1.3, False), (1.35 * 1.04, True, 1.42, False),
+    (1.35 * 1.04, False, 1.3, False),
+])  # fmt: skip
+def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
+    pressing, sparing, after, taken, monkeypatch
+):
+    last = round_of([1, 1], [1.0, pressing])
+    asked = []
+
+    def spare(charts):
+        asked.append(charts)
+        return ["spared"]
+        yield
+
+    made = []
+
+    def of(search, charts, maps, cuts, memory):
+        made.append(maps)
+        return round_of([1, 1], [1.0, after])
+
+    monkeypatch.setattr(shear_bound.Round, "of", staticmethod(of))
+    found = drain(shear_bound._with_areas_spared(None, last, spare if sparing else None, EarlyEnd()))
+    assert (found is not last) == taken
+    if asked:
+        assert asked == [[last.charts[1]]] and made == [[last.maps[0], "spared"]]
+
+
+@pytest.mark.parametrize("excess", [False, True])
+def test_a_round_is_made_shorter_only_within_the_bound(excess, monkeypatch):
+    calls = []
+    for name in ("_with_areas_spared", "_taken_back", "_parts_cut_anew"):
+
+        def steps(search, last, *_, name=name):
+            calls.append(name)
+            return last
+            yield
+
+        monkeypatch.setattr(shear_bound, name, steps)
+    last = round_of([1], [1.5 if excess else 1.2])
+    assert drain(shear_bound._made_shorter(None, last, None, None, EarlyEnd())) is last
+    assert calls == (["_with_areas_spared"] if excess else ["_taken_back", "_parts_cut_anew"])
+
+
+@pytest.mark.parametrize("outcomes, kept", [
+    ([[1.3]], 0), ([[1.5], [1.3]], 1), ([[1.5], [1.4]], None), ([None], None), (["last"], None),
+])  # fmt: skip
+def test_shorter_cuts_are_taken_where_they_keep_the_bound(outcomes, kept, monkeypatch):
+    memory = {"it": SimpleNamespace(polygons=np.array([0]), rehearsed=1.0)}
+    charts = [chart_of(*meshes.single_triangle())]
+    last = round_of([1], [1.1], memory=memory, charts=charts, edges=[[0, 1], [1, 2]])
+    made, asked = [], []
+
+    def cut_anew(search, before, what, map_charts, early):
+        outcome = outcomes[len(asked)]
+        asked.append(what)
+        made.append(None if outcome is None else last if outcome == "last" else round_of([1], outcome))
+        return made[-1]
+        yield
+
+    monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
+    search = SimpleNamespace(
+        count=3, first_spread=lambda: np.full(3, 0.2), surface=SimpleNamespace(positions=np.eye(4)[:, :3])
+    )
+    found = drain(shear_bound._taken_back(search, last, None, EarlyEnd()))
+    assert found is (last if kept is None else made[kept])
+    for k, what in enumerate(asked):
+        share = last.share_allowed(0) ** [1.0, 0.5][k]
+        np.testing.assert_allclose(what.changes["share"], [share, 1, 1])
+        np.testing.assert_allclose(what.spread, 0.2 * np.array([share, 1, 1]) ** shear_bound.SPREAD_BY_SHEAR)
+        assert what.charts == [0] and what.changes["adding"]
+        # Both edges are of length 1.414, or one less is shorter by half.
+        assert what.is_worth(np.array([[0, 1]])) and not what.is_worth(np.array([[0, 1], [1, 2]] * 2))
+
+
+def test_nothing_is_taken_back_where_nothing_has_slack():
+    last = round_of([1], [1.1])
+    assert drain(shear_bound._taken_back(None, last, None, EarlyEnd())) is last
+
+
+def test_maps_of_pieces_shear_less_in_the_mean_by_area():
+    V, F = meshes.single_triangle()
+    charts = [chart_of(V, F), chart_of(2 * V, F)]
+
+    def maps(*shears, folds=0, failure=None):
+        return [SimpleNamespace(angle_mean=s, folds=folds, failure=failure) for s in shears]
+
+    before = maps(1.4, 1.2)
+    assert shear_bound._shears_less(charts, maps(1.7, 1.1), before)
+    assert not shear_bound._shears_less(charts, maps(1.1, 1.3), before)
+    assert not shear_bound._shears_less(charts, maps(1.0, 1.0, folds=1), before)
+    assert shear_bound._shears_less(charts, maps(1.0, 1.0, folds=1), maps(1.4, 1.2, folds=1))
+    assert not shear_bound._shears_less(charts, maps(1.0, 1.0, failure="no"), before)
+    assert not shear_bound._shears_less(charts, before, before)
+
+
+@pytest.mark.parametrize("mean, by_hand, words", [
+    ([1.354, 1.0], [False, False], []),
+    ([1.356, 1.0], [False, False], ["An island, 25 % of the surface, shears 1.36 in the mean, above 1.35: why"]),
+    ([1.5, 1.7], [False, False], ["2 islands shear 1.7 in the mean, above 1.35: why"]),
+])  # fmt: skip
+def test_warnings_of_the_bound_tell_how_much_of_the_surface_misses_it(mean, by_hand, words):
+    found = list(ShearBound(1.35).missed(np.array(mean), np.array([1.0, 3.0]), np.array(by_hand), "why"))
+    assert found == words
+
+
+def test_warnings_of_seams_by_hand_are_told_apart():
+    found = list(ShearBound(1.35).missed(np.array([1.5, 1.6, 1.7]), np.ones(3), np.array([True, True, False]), "why"))
+    assert len(found) == 2 and "their seams were marked by hand" in found[0] and found[0].startswith("2 islands, 67 %")
+    assert found[1].startswith("An island, 33 % of the surface, shears 1.7") and found[1].endswith(": why")
+
+
+@pytest.mark.parametrize(
+    "changed", [{"max_shear": 0.0}, {"seams": "existing"}, {"boundary": "disk"}, {"kind": "conformal"}]
+)
+def test_only_free_maps_of_seams_that_are_searched_have_a_bound(changed):
+    options = UnwrapOptions(max_shear=1.4, cut_further=True)
+    bound = options.shear_bound()
+    assert (bound.bound, bound.further, bound.preferences) == (1.4, True, options.preferences)
+    assert UnwrapOptions(**{"max_shear": 1.4} | changed).shear_bound() is None
+
+
+@pytest.mark.parametrize("name, good, bad", [
+    ("balance", (0, 1), (-0.001, 1.001)), ("aspect", (0, 9999), (-0.001, 10_000)), ("max_shear", (0, 1.01), (1.0, 0.9)),
+])  # fmt: skip
+def test_numbers_of_options_end_where_they_say(name, good, bad):
+    for value in good:
+        assert getattr(UnwrapOptions(**{name: value}), name) == value
+    for value in bad:
+        with pytest.raises(ValueError, match=str(value)):
+            UnwrapOptions(**{name: value})
+
+
+# Starts.
+
+
+def disk_mesh(boundary="free", n=12, **given):
+    V, F = meshes.bumpy(n, n, height=0.1)
+    return initial_map.DiskMesh(V, F, face_areas(V, F), boundary_loops(F)[0], boundary, **given)
+
+
+def flat_uv(disk):
+    return disk.vertices[:, :2].copy()
+
+
+@pytest.mark.parametrize("spread, one, large, found", [
+    (False, True, False, None), (True, True, False, "flat"), (True, False, False, "embedded"),
+    (True, False, True, "bent"), (True, False, "unbent", "embedded"),
+])  # fmt: skip
+def test_a_flat_start_is_bent_in_large_charts_and_a_mean_value_map_in_small(spread, one, large, found, monkeypatch):
+    disk = disk_mesh()
+    flat, bent = flat_uv(disk), flat_uv(disk) + 1
+    monkeypatch.setattr(initial_map, "EVENED_ABOVE", 10 if large else 1500)
+    monkeypatch.setattr(initial_map, "_evenly_flattened", lambda *_: flat if spread else None)
+    monkeypatch.setattr(initial_map, "is_one_to_one", lambda *_: one)
+    monkeypatch.setattr(initial_map, "_bent", lambda _: None if large == "unbent" else bent)
+    start = initial_map.flat_initial_map(disk, RunLog())
+    expected = {None: None, "flat": flat, "bent": bent, "embedded": disk.embedded}[found]
+    assert start is None if expected is None else start.uv is expected
+
+
+def test_a_disk_is_flattened_evenly_below_a_spread_by_the_mass_asked_for():
+    disk = disk_mesh()
+    given = []
+    fake = SimpleNamespace(uv="uv", spread=lambda mass: given.append(mass) or 0.3)
+    disk.__dict__["flat"] = fake
+    assert initial_map._evenly_flattened(disk, 0.31) == "uv" and initial_map._evenly_flattened(disk, 0.3) is None
+    expected = [
+        sum(disk.target[t] / 3 for t in range(len(disk.triangles)) if v in disk.triangles[t]) for v in range(169)
+    ]
+    np.testing.assert_allclose(given[0], expected)
+    assert initial_map._sprawls(disk) is False
+    disk.__dict__["flat"] = None
+    assert initial_map._evenly_flattened(disk, 9) is None and initial_map._sprawls(disk) is True
+    assert initial_map._bent(disk) is None
+
+
+@pytest.mark.parametrize("hopeless, even, one, starts", [
+    (True, True, True, True), (False, True, True, False), (True, False, True, False), (True, True, False, False),
+])  # fmt: skip
+def test_an_even_start_is_for_what_a_mean_value_map_leaves_hopeless(hopeless, even, one, starts, monkeypatch):
+    disk = disk_mesh()
+    monkeypatch.setattr(initial_map, "map_energy", lambda *_: 50.0 if hopeless else 49.9)
+    monkeypatch.setattr(initial_map, "_evenly_flattened", lambda *_: "even" if even else None)
+    monkeypatch.setattr(initial_map, "is_one_to_one", lambda *_: one)
+    assert (initial_map._even_start(disk, None) == "even") == starts
+
+
+@pytest.mark.parametrize("changed, found", [
+    ({}, "flat"), ({"boundary": "disk"}, None), ({"least": 169}, None), ({"most": 168}, None), ({"most": 169}, "flat"),
+    ({"far": True}, None), ({"flat": False}, "evened"), ({"flat": False, "evened": None}, None), ({"above": 100}, "flat"),
+    ({"above": 100, "flat": False}, "evened"), ({"above": 100, "evened": None}, None),
+])  # fmt: skip
+def test_a_roomy_start_is_flat_or_evened_in_meshes_of_a_middle_size(changed, found, monkeypatch):
+    disk = disk_mesh(changed.get("boundary", "free"))
+    disk.__dict__["is_far"] = changed.get("far", False)
+    monkeypatch.setattr(initial_map, "EVENED_ABOVE", changed.get("least", 168))
+    monkeypatch.setattr(initial_map, "DIRECT_WITH_ROOM", changed.get("most", 1000))
+    monkeypatch.setattr(initial_map, "COARSE_ABOVE", changed.get("above", 500))
+    monkeypatch.setattr(initial_map, "_roomy_flat", lambda *_: "flat" if changed.get("flat", True) else None)
+    monkeypatch.setattr(initial_map, "evened_tutte", lambda *_: changed.get("evened", "evened"))
+    start = initial_map.roomy_initial_map(disk, RunLog())
+    assert (None if start is None else start.uv) == found
+
+
+@pytest.mark.parametrize("most, far, found", [(169, False, "sites"), (168, False, None), (169, True, None)])
+def test_an_evened_start_is_for_meshes_of_a_middle_size_near_their_areas(most, far, found, monkeypatch):
+    disk = disk_mesh("disk")
+    disk.__dict__["is_far"] = far
+    monkeypatch.setattr(initial_map, "DIRECT_WITH_ROOM", most)
+    monkeypatch.setattr(initial_map, "evened_sites", lambda *_: "sites")
+    start = initial_map.evened_initial_map(disk, RunLog())
+    assert (None if start is None else start.uv) == found
+
+
+@pytest.mark.parametrize("boundary", ["free", "disk"])
+def test_drafts_and_direct_starts_are_flat_only_where_the_boundary_is_free(boundary, monkeypatch):
+    disk = disk_mesh(boundary)
+    monkeypatch.setattr(initial_map, "flat_initial_map", lambda *_: "flat")
+    monkeypatch.setattr(initial_map, "initial_map", steps_of("transported"))
+    assert drain(initial_map.direct_initial_map(disk, RunLog())) == ("flat" if boundary == "free" else "transported")
+    draft = initial_map._draft_start(disk, "embedded", RunLog())
+    assert draft == "flat" if boundary == "free" else draft.uv == "embedded"
+    monkeypatch.setattr(initial_map, "flat_initial_map", lambda *_: None)
+    assert drain(initial_map.direct_initial_map(disk, RunLog())) == "transported"
+    assert initial_map._draft_start(disk, "embedded", RunLog()).uv == "embedded"
+
+
+def test_what_comes_back_is_smoothed_at_the_scale_of_its_target():
+    disk = disk_mesh()
+    uv = flat_uv(disk) * 7
+    drafts = [drain(initial_map._smoothed(disk, uv, 200.0, draft)) for draft in (True, False)]
+    for found in drafts:
+        area = signed_areas(found, disk.triangles)
+        assert (area > 0).all() and area.sum() == pytest.approx(disk.target.sum(), rel=0.02)
+    assert np.abs(drafts[0] - drafts[1]).max() > 1e-9
+    share = signed_areas(drafts[0], disk.triangles) / disk.target
+    assert np.abs(share / share.mean() - 1) @ disk.target / disk.target.sum() <= 0.05
+
+
+@pytest.mark.parametrize("corners, aspect, domain", [
+    (None, 1.0, (1.0, 1.0)), (np.arange(4), 4.0, (0.5, 2.0)), (np.arange(4), 1.0, (1.0, 1.0)),
+])  # fmt: skip
+def test_domains_have_the_aspect_as_height_over_width(corners, aspect, domain):
+    found = disk_mesh("rectangle", corners=corners, aspect=aspect).domain
+    assert type(found).__name__ == ("Disk" if corners is None else "Rectangle")
+    if corners is not None:
+        assert (found.width, found.height) == pytest.approx(domain)
+
+
+# Convex polygons.
+
+
+def figures(**given):
+    return SimpleNamespace(**{"folds": 0, "area_l1": 0.01, "area_sd": 0.02, "angle_mean": 1.2, "warnings": ()} | given)
+
+
+@pytest.mark.parametrize("folds, area, keeps", [
+    (1, 0.0, True), (2, 0.0, False), (0, 0.0219, True), (0, 0.0221, False),
+])  # fmt: skip
+def test_maps_are_kept_with_no_more_folds_and_about_the_areas(folds, area, keeps):
+    assert convex_maps._keeps(figures(folds=folds, area_l1=area), figures(folds=1), 0.02) == keeps
+    assert convex_maps._keeps(figures(area_l1=0.054), figures(area_l1=0.05), 0.02)
+    assert not convex_maps._keeps(figures(area_l1=0.056), figures(area_l1=0.05), 0.02)
+
+
+@pytest.mark.parametrize("angle, area, folds, isometry", [
+    (1 + 5e-8, 5e-8, 0, True), (1 + 2e-7, 0, 0, False), (1, 2e-7, 0, False), (1, 0, 1, False),
+])  # fmt: skip
+def test_isometries_have_neither_shear_nor_error_nor_folds(angle, area, folds, isometry):
+    assert convex_maps._is_isometry(figures(angle_mean=angle, area_l1=area, folds=folds)) == isometry
+
+
+def test_folds_are_told_once_and_as_many_as_there_are():
+    before = ("Other", f"3 {FOLDED}")
+    assert convex_maps._folds_told(before, 2) == ("Other", f"2 {FOLDED}")
+    assert convex_maps._folds_told(before, 0) == ("Other",)
+    assert convex_maps._folds_told((), 1) == (f"1 {FOLDED}",)
+
+
+def test_pins_and_outlines_of_domains_stay():
+    V, F = meshes.grid(3, 2)
+    chart, loop = chart_of(V, F), set(boundary_loops(F)[0].tolist())
+    pins = SimpleNamespace(vertices=np.array([5, 6]))
+    assert not convex_maps._fixed(chart, None, "free").any()
+    assert np.flatnonzero(convex_maps._fixed(chart, pins, "free")).tolist() == [5, 6]
+    for boundary in ("disk", "square"):
+        assert set(np.flatnonzero(convex_maps._fixed(chart, None, boundary))) == loop
+        assert set(np.flatnonzero(convex_maps._fixed(chart, pins, boundary))) == loop | {5, 6}
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e6, 1e-6])
+def test_maps_lie_as_before_with_the_area_of_before(unit):
+    V, F = meshes.grid(4, 3)
+    given = V[:, :2] * [3, 2] * unit + [7 * unit, -2 * unit]
+    turn = np.array([[np.cos(2), np.sin(2)], [-np.sin(2), np.cos(2)]])
+    found = convex_maps._as_before(5 * given @ turn + unit, given, F)
+    np.testing.assert_allclose(found, given, rtol=1e-9, atol=1e-9 * unit)
+
+
+def test_dented_polygons_have_an_area_though_a_triangle_of_theirs_folds():
+    V = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [4, 0, 0], [4, 2, 0], [6, 0, 0], [6, 2, 0]], float)
+    F = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2], [4, 6, 7], [4, 7, 5]])
+    chart = chart_of(V, F, [0, 0, 1, 1, 2, 2])
+    uv = V[:, :2].copy()
+    assert not convex_maps._dented(chart, uv).any()
+    uv[3] = [1.5, 0.5]
+    assert convex_maps._dented(chart, uv).tolist() == [True] * 2 + [False] * 4
+    assert convex_maps._dented(chart, uv * [-1, 1]).tolist() == [True] * 2 + [False] * 4
+    uv[3] = [3, -1]  # the polygon lies the other way as a whole
+    assert not convex_maps._dented(chart, uv)[:2].any()
+    flat = V.copy()
+    flat[3] = [1, 1, 0]
+    uv[3] = [1.5, 0.5]
+    assert not convex_maps._dented(chart_of(flat, F, [0, 0, 1, 1, 2, 2]), uv).any()
+
+
+def test_folds_are_counted_by_polygon_whichever_way_a_chart_lies():
+    V, F = meshes.grid(2, 1)
+    chart = chart_of(V, F, [0, 1, 0, 1])
+    uv = V[:, :2].copy()
+    plain = map_of(uv)
+    assert convex_maps.with_folds_counted(chart, plain) is plain
+    uv[F[0][0]] = uv[F[0]][1:].mean(axis=0) + 0.5 * (uv[F[0]][1:].mean(axis=0) - uv[F[0][0]])
+    count = len(set(chart.faces[signed_areas(uv, F) <= 0].tolist()))
+    for flip in (1, -1):
+        found = convex_maps.with_folds_counted(chart, map_of(uv * [flip, 1]))
+        assert found.folds == count > 0 and found.warnings == (f"{count} {FOLDED}",)
+
+
+def test_values_of_polygons_are_means_by_area():
+    V, F = meshes.bumpy(2, 2)
+    faces = np.array([0, 0, 1, 2, 2, 2, 3, 1])
+    values = np.arange(8.0)
+    found, area = convexity._of_polygons(values, chart_of(V, F, faces)), face_areas(V, F)
+    for k in range(8):
+        mine = faces == faces[k]
+        assert found[k] == pytest.approx(area[mine] @ values[mine] / area[mine].sum())
+    assert convexity._longer(np.array([True, False]), 4).tolist() == [True, False, False, False]
+
+
+def test_outlines_cross_about_the_edges_that_do():
+    loop = np.arange(24)
+    w = np.exp(2j * np.pi * loop / 24)
+    moved = w.copy()
+    moved[0] = -1.2
+    # Edges 23 and 0 cross 11 and 12.
+    expected = {(edge + k) % 24 for edge in (23, 0, 11, 12) for k in range(-2, 4)}
+    assert set(convexity._crossed(w, moved, loop, False).tolist()) == expected
+    assert convexity._crossed(w, moved, loop, True).tolist() == loop.tolist()
+    assert len(convexity._crossed(moved, moved, loop, True)) == 0
+    assert len(convexity._crossed(w, w, loop, True)) == 0
+
+
+@pytest.mark.parametrize("share, squeezed", [(-0.1, True), (0.0, True), (0.5e-15, True), (2e-15, False)])
+def test_triangles_are_squeezed_where_their_area_is_rounding_of_their_charts(share, squeezed):
+    w = np.array([0, 1, 1j, 0, 1, 1j * share]).astype(complex)
+    mesh = SimpleNamespace(triangles=np.array([[0, 1, 2], [3, 4, 5]]), chart=np.array([0, 0]))
+    assert convexity._squeezed(mesh, w).tolist() == [False, squeezed]
+
+
+# Charts like other charts.
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_frames_are_axes_of_two_points(sign):
+    points = np.array([[2.0, 0, 0], [5.0, 3.0, 0]])
+    np.testing.assert_allclose(mirrored_charts._frame(points, sign), np.diag([1, 1, sign]))
+    turned = points @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    frame = mirrored_charts._frame(turned, sign)
+    np.testing.assert_allclose(frame.T @ frame, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(frame.T @ turned.T, [[2, 5], [0, 3], [0, 0]], atol=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(sign)
+    assert not np.isfinite(mirrored_charts._frame(np.array([[1.0, 0, 0], [2.0, 0, 0]]))).all()
+
+
+@pytest.mark.parametrize("off, same", [(0.0, True), (0.5e-4, True), (1e-3, False)])
+@pytest.mark.parametrize("name", ["density", "region"])
+def test_targets_of_images_are_compared_vertex_by_vertex(name, off, same):
+    V, F = meshes.grid(2, 2)
+    charts = [chart_of(V, F), chart_of(V, F)]
+    values = np.random.default_rng(0).uniform(0.5, 1, len(F))
+    other = values.copy()
+    other[3] += off
+    plain = np.ones(len(F))
+
+    def target(x):
+        return Target(x, None) if name == "density" else Target(plain, x)
+
+    image = np.arange(len(V))
+    assert mirrored_charts._same_targets(charts, [target(values), target(other)], 0, 1, image) == same
+    assert mirrored_charts._same_targets(charts, [None, None], 0, 1, image)
+    assert not mirrored_charts._same_targets(charts, [None, target(values)], 0, 1, image)
+    assert not mirrored_charts._same_targets(charts, [Target(plain, None), Target(plain, values)], 0, 1, image)
+    at = mirrored_charts._at_vertices(charts[0], values)
+    np.testing.assert_allclose(at, [values[(v == F).any(axis=1)].mean() for v in range(len(V))])
+
+
+@pytest.mark.parametrize("folds, area, goal, kept", [
+    (0, 0.02, 0.02, True), (1, 0.02, 0.02, False), (0, 0.031, 0.02, False), (0, 0.029, 0.02, True), (0, 0.04, 0.001, False),
+])  # fmt: skip
+def test_maps_of_mirrored_quads_are_measured_as_they_were_given(folds, area, goal, kept, monkeypatch):
+    V, F = meshes.grid(2, 2)
+    found = map_of(V[:, :2])
+    measured = SimpleNamespace(folds=folds, area_l1=area, area_sd=0.5, angle_mean=1.7)
+    monkeypatch.setattr(mirrored_charts, "measured_chart", lambda *_: measured)
+    new = mirrored_charts.as_given(chart_of(V, F), found, None, goal)
+    assert (new is not None) == kept
+    if kept:
+        assert (new.area_l1, new.area_sd, new.angle_mean) == (area, 0.5, 1.7) and new.uv is found.uv
+
+
+def test_two_triangles_get_one_polygon_unless_a_cut_has_parted_them():
+    V, F = meshes.quad_patch()
+    label = np.array([0, 0, 2])
+    assert mirrored_charts._relabelled(chart_of(V, F, [0, 1]), label).faces.tolist() == [0, 0]
+    apart = np.concatenate([V, V])
+    parted = np.array([F[0], F[1] + 4])
+    assert mirrored_charts._relabelled(chart_of(apart, parted, [0, 1]), label).faces.tolist() == [0, 1]
+
+
+def test_charts_that_are_as_before_keep_their_maps():
+    V, F = meshes.grid(2, 2)
+    known, new = chart_of(V, F), chart_of(V, F[:4])
+    asked = []
+
+    def map_charts(charts):
+        asked.extend(charts)
+        return ["new"] * len(charts)
+        yield
+
+    assert drain(mirrored_charts.mapped_anew([new, known], [(known, "known")], map_charts)) == ["new", "known"]
+    assert asked == [new]
+
+
+# Polygons cut for maps.
+
+
+def test_centres_lie_amid_the_corners_of_their_fans():
+    turn = 2 * np.pi * np.arange(5) / 5
+    uv = np.column_stack([np.cos(turn) + 3, 2 * np.sin(turn)])
+    fans = np.array([[k, (k + 1) % 5, 5] for k in range(5)])
+    found = polygon_disk.with_centres(uv, fans, 6)
+    np.testing.assert_allclose(found, np.concatenate([uv, [uv.mean(axis=0)]]))
+
+
+def test_numbers_are_given_in_the_order_of_coming():
+    assert polygon_disk._numbered(np.array([7, 3, 7, 9, 3])).tolist() == [0, 1, 0, 2, 1]
+
+
+def test_roundness_is_area_over_squared_sides():
+    corners = np.array([[[0, 0], [3, 0], [0, 4.0]]])
+    assert polygon_disk._roundness(corners, np.array([6.0]))[0] == pytest.approx(6 / 50)
+
+
+def test_pins_of_domains_are_refused_by_name():
+    pins = SimpleNamespace(vertices=np.array([3, 5]))
+    chart_indices.refuse_pins_on_outline(pins, "free")
+    chart_indices.refuse_pins_on_outline(None, "disk")
+    with pytest.raises(PinError, match="stay in place in a square") as error:
+        chart_indices.refuse_pins_on_outline(pins, "square")
+    assert error.value.elements.tolist() == [3, 5] and error.value.kind == "vertex"
+
+
+def test_edges_within_charts_are_cut_anew_and_others_stay():
+    # A slit: the edge 1-4 of the surface is on both sides of the chart.
+    V, F = meshes.grid(2, 2)
+    at = F.copy()
+    V2 = np.concatenate([V, V[[1]]])
+    left = [k for k in range(len(F)) if 1 in F[k] and V[F[k]][:, 0].mean() < 0.5]
+    at[left] = np.where(at[left] == 1, 9, at[left])
+    chart = chart_of(V2, at, ids=[*range(9), 1])
+    assert chart_indices.within(chart).tolist() == [pair_keys(np.array([1]), np.array([4]))[0]]
+    edges = np.array([[4, 1], [0, 1]])
+    assert chart_indices.but_within(edges, [chart]).tolist() == [[0, 1]]
+    assert chart_indices.but_within(edges, []).tolist() == edges.tolist()
+
+
+def test_a_map_lies_like_what_was_given_or_is_one_unit_wide():
+    V, F = meshes.grid(3, 2)
+    w = V[:, :2] @ [1, 1j]
+    turn = 3 * np.exp(0.5j)
+    found = chart_indices._placed_like_given(w, F, (turn * w + 5)[F])
+    np.testing.assert_allclose(found - found[0], turn * (w - w[0]), atol=1e-9)
+    for nothing_ in (np.zeros(F.shape, complex), np.full(F.shape, np.nan + 0j)):
+        found = chart_indices._placed_like_given(5 * w, F, nothing_)
+        np.testing.assert_allclose(found, w / max(np.ptp(w.real), np.ptp(w.imag)), atol=1e-12)
+
+
+def test_keys_of_polygons_know_no_diagonal():
+    one, other = np.array([[0, 1, 2], [0, 2, 3], [5, 6, 7]]), np.array([[0, 1, 3], [1, 2, 3], [5, 6, 7]])
+    polygon = np.array([0, 0, 1])
+    for triangles in (one, other):
+        highest, total, lowest = chart_indices._polygon_keys(triangles, polygon)
+        assert highest.tolist() == [3, 3, 7] and total.tolist() == [6, 6, 18] and lowest.tolist() == [0, 0, 5]
+
+
+def test_targets_of_charts_stand_side_by_side():
+    assert small_charts._side_by_side([None, None]) == {}
+    found = small_charts._side_by_side([Target(np.array([2.0, 3.0]), None), Target(np.array([4.0]), None)])
+    assert found["density"].tolist() == [2, 3, 4] and found["region"] is None
+    found = small_charts._side_by_side([Target(np.ones(2), np.array([0.1, 0.2])), Target(np.ones(1), np.array([0.3]))])
+    assert found["region"].tolist() == [0.1, 0.2, 0.3]
+
+
+def test_maps_of_many_charts_are_placed_about_their_middles_with_their_areas():
+    V, F = meshes.bumpy(3, 3)
+    charts = [chart_of(V, F), chart_of(5 * V, F)]
+    boxes = [(V, 1.0), (V, 5.0)]
+    uv = np.concatenate([V[:, :2] * 2 + 9, V[:, :2] * 0.1 - 4])
+    for density in (None, np.concatenate([np.full(len(F), 2.0), np.full(len(F), 3.0)])):
+        found = small_charts._placed(charts, boxes, uv, density)
+        for chart, placed, factor in zip(charts, found, (2.0, 3.0), strict=True):
+            area = signed_areas(placed, F)
+            assert area.sum() == pytest.approx(face_areas(chart.vertices, F).sum() * (1 if density is None else factor))
+            np.testing.assert_allclose(area @ placed[F].mean(axis=1), 0, atol=1e-9)
+
+
+def test_what_fails_together_is_mapped_alone(monkeypatch):
+    def fails(*_, **__):
+        raise MeshError("No")
+        yield
+
+    monkeypatch.setattr(batch_refine, "refine_batch", fails)
+    V, F = meshes.grid(2, 2)
+    found = drain(small_charts._map_batch([chart_of(V, F)] * 2, [None, None], MapOptions()))
+    assert found == [None, None]
