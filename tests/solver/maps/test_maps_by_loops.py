@@ -10,8 +10,18 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps import boxes, contacts, development, distortion, embedding, energy, local_untangle, overlap
-from omt_uv.solver.maps import polygon_elements, upright
+from omt_uv.solver.maps import (
+    boxes,
+    contacts,
+    development,
+    distortion,
+    embedding,
+    energy,
+    local_untangle,
+    overlap,
+    polygon_elements,
+    upright,
+)
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 
 

@@ -15,9 +15,15 @@ from omt_uv.solver.maps.mirror_symmetry import mirror_symmetry
 from omt_uv.solver.maps.polygon_elements import polygon_elements
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
-from omt_uv.solver.refinement import batch_refine, boundary_barrier, initial_maps, mesh_hierarchy, mirrored_motion
+from omt_uv.solver.refinement import (
+    batch_refine,
+    boundary_barrier,
+    initial_maps,
+    mesh_hierarchy,
+    mirrored_motion,
+    vertex_sweeps,
+)
 from omt_uv.solver.refinement import pins as pinning
-from omt_uv.solver.refinement import vertex_sweeps
 from omt_uv.solver.refinement.projected_newton import fold_shares
 
 
