@@ -211,10 +211,14 @@ def test_small_regions_join_the_neighbour_with_most_border():
     assert group[2] == group[1] != group[0] == group[3]
     least = feature_edges.LEAST_TRIANGLES * np.sqrt(3) / 4
     for size, joins in ((least * 0.99, True), (least * 1.01, False)):
-        group = feature_edges._merged(np.array([50.0, size]), np.array([5.0, 0]), np.array([0]), np.array([1]), np.array([0.1]))
+        group = feature_edges._merged(
+            np.array([50.0, size]), np.array([5.0, 0]), np.array([0]), np.array([1]), np.array([0.1])
+        )
         assert (group[0] == group[1]) == joins
     for width, joins in ((0.24, True), (0.26, False)):
-        found = feature_edges._merged(np.array([50.0, 5.0]), np.zeros(2), np.array([0]), np.array([1]), np.array([10 / width]))
+        found = feature_edges._merged(
+            np.array([50.0, 5.0]), np.zeros(2), np.array([0]), np.array([1]), np.array([10 / width])
+        )
         assert (found[0] == found[1]) == joins
 
 
@@ -306,7 +310,9 @@ def test_the_best_path_is_cheapest_with_its_turns():
     beside = {v: [u for e in of for u in e if v in e and u != v] for v in range(16)}
 
     def price(path, turn):
-        steps = [np.linalg.norm(V[b] - V[a]) * of[tuple(sorted((a, b)))] for a, b in zip(path[:-1], path[1:], strict=True)]
+        steps = [
+            np.linalg.norm(V[b] - V[a]) * of[tuple(sorted((a, b)))] for a, b in zip(path[:-1], path[1:], strict=True)
+        ]
         total = sum(steps)
         for k in range(1, len(path) - 1):
             one, two = V[path[k]] - V[path[k - 1]], V[path[k + 1]] - V[path[k]]

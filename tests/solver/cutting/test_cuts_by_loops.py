@@ -81,7 +81,9 @@ def test_edges_are_found_by_their_ends_either_way_around():
     edges = np.random.default_rng(0).permutation(len(component.ends))[:7]
     a, b = component.ends[edges].T
     for one, other in ((a, b), (b, a)):
-        np.testing.assert_array_equal(cut_graph._edges_between(component.ends, one, other, component.vertex_count), edges)
+        np.testing.assert_array_equal(
+            cut_graph._edges_between(component.ends, one, other, component.vertex_count), edges
+        )
 
 
 def test_a_stretch_is_one_while_it_is_cut_and_nothing_branches_off_inside():
@@ -372,7 +374,9 @@ def test_a_unit_box_holds_what_is_used():
 def test_borders_are_hard_where_sides_differ_by_their_lengths():
     sums = defaultdict(float)
     component = component_of(*meshes.cube())
-    side = np.array([int(np.abs(np.cross(*np.diff(component.positions[t], axis=0))).argmax()) for t in component.triangles])
+    side = np.array(
+        [int(np.abs(np.cross(*np.diff(component.positions[t], axis=0))).argmax()) for t in component.triangles]
+    )
     border = side[component.pair[:, 0] // 3] != side[component.pair[:, 1] // 3]
     chain, pair, length, _ = crease_sides._chains(component, side, border, np.zeros(component.vertex_count))
     for e in np.flatnonzero(border):

@@ -119,7 +119,9 @@ def test_surfaces_are_cut_along_shorter_diagonals_in_their_rows():
         shorter = {a, c} if np.linalg.norm(V[a] - V[c]) < np.linalg.norm(V[b] - V[d]) else {b, d}
         assert shared == shorter and set(rows.ravel().tolist()) == set(quad)
         before = V[given.corner_vertex[given.triangles[given.triangle_face == face]]]
-        assert face_areas(V, rows).sum() == pytest.approx(face_areas(before.reshape(-1, 3), np.arange(6).reshape(2, 3)).sum())
+        assert face_areas(V, rows).sum() == pytest.approx(
+            face_areas(before.reshape(-1, 3), np.arange(6).reshape(2, 3)).sum()
+        )
     again = edge_flips.cut_along_shorter(found)
     np.testing.assert_array_equal(np.sort(again.triangles, axis=1), np.sort(found.triangles, axis=1))
 
@@ -130,7 +132,10 @@ def test_triangles_of_quads_are_aligned_by_their_normals(bent):
     points = rng.normal(size=(20, 4, 3)) * [1, 1, bent]
     found = polygon_areas._alignment(points)
     for q in range(20):
-        normals = [np.cross(points[q, b] - points[q, a], points[q, c] - points[q, a]) for a, b, c in polygon_areas.BOTH.tolist()]
+        normals = [
+            np.cross(points[q, b] - points[q, a], points[q, c] - points[q, a])
+            for a, b, c in polygon_areas.BOTH.tolist()
+        ]
         own = normals[0] + normals[1]
         expected = [n @ own / np.linalg.norm(n) / np.linalg.norm(own) for n in normals]
         np.testing.assert_allclose(found[q], expected, atol=1e-9)
@@ -187,8 +192,10 @@ def test_distances_from_faces_are_from_their_nearest_points():
     assert kinds == {1, 2, 3}
     several = index.distance(points[:5], np.stack([faces[:5], faces[5:10]], axis=1))
     np.testing.assert_allclose(several[1][:, 0], square[:5])
-    np.testing.assert_allclose(index._best(points[:5], np.arange(20)[None].repeat(5, 0)),
-                               [index.distance(p[None].repeat(20, 0), np.arange(20))[1].argmin() for p in points[:5]])
+    np.testing.assert_allclose(
+        index._best(points[:5], np.arange(20)[None].repeat(5, 0)),
+        [index.distance(p[None].repeat(20, 0), np.arange(20))[1].argmin() for p in points[:5]],
+    )
 
 
 def test_a_thin_face_answers_with_its_sides():
@@ -233,7 +240,9 @@ def test_corners_find_the_nearest_corner_of_the_image_of_their_polygon(normal):
     normal = np.array(normal, float)
     other = polygons.images_of_polygons(normal)
     for k in range(16):
-        np.testing.assert_allclose(polygons.centres[other[k]], mirror._reflected(polygons.centres[k], normal), atol=1e-9)
+        np.testing.assert_allclose(
+            polygons.centres[other[k]], mirror._reflected(polygons.centres[k], normal), atol=1e-9
+        )
     corner, to = polygons._nearest_corners(other, normal, np.ones(16, bool))
     for c, v in zip(corner, to, strict=True):
         np.testing.assert_allclose(V[v], mirror._reflected(V[polygons.vertex[c]], normal), atol=1e-9)
@@ -262,7 +271,9 @@ def test_two_triangles_cut_otherwise_than_their_images_are_a_quad():
     tail = F[one].tolist()
     a, b = (a, b) if tail[(tail.index(a) + 1) % 3] == b else (b, a)
     G[one], G[other] = [p, a, q], [p, q, b]
-    rest = np.array([t for t in range(len(G)) if frozenset(image[G[t]].tolist()) not in {frozenset(g) for g in G.tolist()}])
+    rest = np.array(
+        [t for t in range(len(G)) if frozenset(image[G[t]].tolist()) not in {frozenset(g) for g in G.tolist()}]
+    )
     assert len(rest) == 4 and keys
     found = {frozenset(x) for x in mirror._recut(G, image, rest).tolist()}
     there = {t for t in rest.tolist() if t not in (one, other)}

@@ -108,7 +108,9 @@ def test_edges_come_by_what_they_leave_of_missing_neighbours_and_length(collapse
     group[order] = np.floor(np.cumsum(amount[order]))
     ranks = {h: sum(cost(g) < cost(h) for g in expected if group[tail[g]] == group[tail[h]]) for h in expected}
     assert (np.diff([ranks[h] for h in found.tolist()]) >= 0).all()
-    assert [cost(h) for h in found.tolist() if group[tail[h]] == 0] == sorted(cost(h) for h in expected if group[tail[h]] == 0)
+    assert [cost(h) for h in found.tolist() if group[tail[h]] == 0] == sorted(
+        cost(h) for h in expected if group[tail[h]] == 0
+    )
 
 
 def test_steps_go_along_the_surface_and_no_farther_than_a_share_of_the_sides_around():
@@ -200,7 +202,9 @@ def test_sums_are_of_the_samples_nearest_by_place_and_normal():
     samples, scale = carrier._samples, carrier.index.normal_scale
     near, area, mass, moment = [], np.zeros(len(points)), np.zeros(len(points)), np.zeros(points.shape)
     for k in range(len(samples.points)):
-        off = ((points - samples.points[k]) ** 2).sum(axis=1) + scale**2 * ((normals - samples.normals[k]) ** 2).sum(axis=1)
+        off = ((points - samples.points[k]) ** 2).sum(axis=1) + scale**2 * ((normals - samples.normals[k]) ** 2).sum(
+            axis=1
+        )
         near.append(int(off.argmin()))
         heavy = samples.area[k] * carrier.density[samples.faces[k]] ** 2
         area[near[-1]] += samples.area[k]
@@ -215,7 +219,9 @@ def test_sums_are_of_the_samples_nearest_by_place_and_normal():
     target = 0.2 / np.sqrt(carrier.density[samples.faces])
     chosen = carrier.nearest(points, normals, size)
     for k in range(len(samples.points)):
-        off = ((points - samples.points[k]) ** 2).sum(axis=1) + scale**2 * ((normals - samples.normals[k]) ** 2).sum(axis=1)
+        off = ((points - samples.points[k]) ** 2).sum(axis=1) + scale**2 * ((normals - samples.normals[k]) ** 2).sum(
+            axis=1
+        )
         off = off + (2 * scale * (np.log(size) - np.log(target[k]))) ** 2
         assert off[chosen[k]] == pytest.approx(off.min())
 
@@ -301,7 +307,9 @@ def test_curves_are_walked_by_length_and_their_means_lie_between():
     curve = boundary_samples._Curve(p, np.ones(41))
     step = np.linalg.norm(np.diff(p, axis=0), axis=1)
     for k in (0, 7, 39):
-        np.testing.assert_allclose(curve.at(np.array([step[:k].sum() + 0.3 * step[k]]))[0], p[k] + 0.3 * (p[k + 1] - p[k]))
+        np.testing.assert_allclose(
+            curve.at(np.array([step[:k].sum() + 0.3 * step[k]]))[0], p[k] + 0.3 * (p[k + 1] - p[k])
+        )
         np.testing.assert_allclose(curve.at(step[:k].sum() + step.sum()), p[k], atol=1e-9)
     straight = np.array([[0, 0, 0], [10, 0, 0], [10, 1, 0], [0, 1, 0], [0, 0, 0.0]])
     means = boundary_samples._Curve(straight, np.ones(5)).means(np.array([2.0, 3.0, 5.0, 11.5, 16.0]))

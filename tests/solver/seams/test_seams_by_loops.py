@@ -100,7 +100,9 @@ def test_cuts_are_compared_at_one_spread(spread, factor):
 def test_the_first_of_even_cuts_is_the_best_and_stuck_is_far_from_its_bound():
     cuts = [coarse_cut_of(c, 1.0) for c in (3.0, 2.0, 2.0 * (1 - 1e-13), 2.5)]
     assert coarse_cut.best_of(cuts) is cuts[1]
-    assert not coarse_cut_of(1, coarse_cut.STUCK * 0.999).is_stuck and coarse_cut_of(1, coarse_cut.STUCK * 1.001).is_stuck
+    assert (
+        not coarse_cut_of(1, coarse_cut.STUCK * 0.999).is_stuck and coarse_cut_of(1, coarse_cut.STUCK * 1.001).is_stuck
+    )
 
 
 def test_steps_across_edges_are_as_long_as_over_both_triangles_laid_flat():
@@ -172,7 +174,10 @@ def test_crumbs_between_a_cut_and_its_image_join_what_they_share_most_of():
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
 def test_the_smallest_box_lies_along_a_side_of_the_hull(angle):
-    uv = np.array([[0, 0], [4, 0], [4, 1], [0, 1], [2, 0.5]]) @ [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+    uv = np.array([[0, 0], [4, 0], [4, 1], [0, 1], [2, 0.5]]) @ [
+        [np.cos(angle), np.sin(angle)],
+        [-np.sin(angle), np.cos(angle)],
+    ]
     found = limbs._in_smallest_box(uv)
     assert sorted(np.ptp(found, axis=0)) == pytest.approx([1, 4])
     np.testing.assert_allclose(np.linalg.norm(found[1] - found[2]), 1)
@@ -185,8 +190,13 @@ def test_the_smallest_box_lies_along_a_side_of_the_hull(angle):
 
 
 def search_of(**given):
-    fields = {"spread": np.array([1.0, np.inf, np.inf]), "surface": SimpleNamespace(positions=np.zeros((4, 3))),
-              "costs": lambda: SimpleNamespace(of=lambda a, b: 1.0 + a + b, plane=None, in_face=np.array([True, False, False, True]))}
+    fields = {
+        "spread": np.array([1.0, np.inf, np.inf]),
+        "surface": SimpleNamespace(positions=np.zeros((4, 3))),
+        "costs": lambda: SimpleNamespace(
+            of=lambda a, b: 1.0 + a + b, plane=None, in_face=np.array([True, False, False, True])
+        ),
+    }
     return SeamSearch(**fields | given)  # fmt: skip
 
 
@@ -300,7 +310,9 @@ def test_halves_end_in_the_plane_and_have_half_of_the_area():
     assert len(found.positions) == len(V) and len(found.seams) == (1 if plane[seams[0]].all() else 2)
     for v, p in zip(found.vertex, found.positions, strict=True):
         assert np.allclose(p, V[v]) or np.allclose(p, [1 - V[v, 0], V[v, 1], V[v, 2]])
-    normals = np.cross(*(found.positions[found.triangles[:, k]] - found.positions[found.triangles[:, 0]] for k in (1, 2)))
+    normals = np.cross(
+        *(found.positions[found.triangles[:, k]] - found.positions[found.triangles[:, 0]] for k in (1, 2))
+    )
     assert (normals[:, 2] > 0).all() or (normals[:, 2] < 0).all()
 
 
