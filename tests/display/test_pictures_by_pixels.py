@@ -12,9 +12,24 @@ from omt_uv.display import histogram, preview, raster
 from omt_uv.display.textures import layouts, patterns, world
 
 
-@pytest.mark.parametrize("value, top", [
-    (0, 1), (-3, 1), (1, 1), (1.001, 2), (2, 2), (3.9, 4), (5, 8), (8, 8), (8.1, 10), (10, 10), (19, 20), (0.011, 0.02), (9.9, 10),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "value, top",
+    [
+        (0, 1),
+        (-3, 1),
+        (1, 1),
+        (1.001, 2),
+        (2, 2),
+        (3.9, 4),
+        (5, 8),
+        (8, 8),
+        (8.1, 10),
+        (10, 10),
+        (19, 20),
+        (0.011, 0.02),
+        (9.9, 10),
+    ],
+)
 def test_ends_of_axes_are_round(value, top):
     assert histogram._round_up(value) == pytest.approx(top)
 
@@ -26,9 +41,18 @@ def test_words_stand_around_the_middle(end, step, places):
     assert histogram._around(end, step) == places
 
 
-@pytest.mark.parametrize("far, share, end", [
-    (3.2, 0.011, 4), (3.2, 0.009, 2), (4.0, 0.5, 4), (4.0000001, 0.5, 4), (4.01, 0.5, 5), (99.0, 0.5, 10), (0.5, 0.5, 2),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "far, share, end",
+    [
+        (3.2, 0.011, 4),
+        (3.2, 0.009, 2),
+        (4.0, 0.5, 4),
+        (4.0000001, 0.5, 4),
+        (4.01, 0.5, 5),
+        (99.0, 0.5, 10),
+        (0.5, 0.5, 2),
+    ],
+)
 def test_axes_reach_over_all_but_a_hundredth_of_the_surface(far, share, end):
     assert histogram._reach(np.array([far, 0.1]), np.array([share, 1 - share]), 2) == end
 
@@ -109,8 +133,13 @@ def test_boxes_are_fitted_into_the_middle():
 
 
 def drawn_of(space, normals=None):
-    return preview._Drawn(space, np.tile([0, 0, 1.0], (len(space), 3, 1)) if normals is None else normals, None,
-                          np.ones((len(space), 3), bool), np.zeros(len(space)))  # fmt: skip
+    return preview._Drawn(
+        space,
+        np.tile([0, 0, 1.0], (len(space), 3, 1)) if normals is None else normals,
+        None,
+        np.ones((len(space), 3), bool),
+        np.zeros(len(space)),
+    )
 
 
 def test_cameras_look_down_from_the_front_and_the_right():
@@ -224,8 +253,12 @@ def test_samples_are_averaged_on_paper():
 def test_layouts_show_each_polygon_in_its_colour(kind):
     V = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0.0]])
     corner = np.array([0, 1, 2, 3, 1, 4, 5, 2])
-    surface = SimpleNamespace(positions=V, corner_vertex=corner, triangles=np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),
-                              triangle_face=np.array([0, 0, 1, 1]))  # fmt: skip
+    surface = SimpleNamespace(
+        positions=V,
+        corner_vertex=corner,
+        triangles=np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),
+        triangle_face=np.array([0, 0, 1, 1]),
+    )
     uv = np.array([[0.1, 0.1], [0.4, 0.1], [0.4, 0.4], [0.1, 0.4], [0.5, 0.5], [0.9, 0.5], [0.9, 0.6], [0.5, 0.6]])
     reading = SimpleNamespace(surface=surface, faces=np.ones(2, bool), uv=uv)
     picture = layouts.layout_picture([SimpleNamespace(reading=reading, rotation=np.eye(3))], kind, 40)

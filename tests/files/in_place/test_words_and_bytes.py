@@ -15,27 +15,49 @@ from omt_uv.files.in_place import glb, glb_data, imported, obj, obj_text, ply, p
 from omt_uv.files.in_place.imported import Imported, InPlaceError
 
 
-@pytest.mark.parametrize("data, lines", [
-    (b"a\nb\n", [b"a\n", b"b\n"]), (b"a\nb", [b"a\n", b"b"]), (b"a\\\nb\nc", [b"a\\\nb\n", b"c"]), (b"", []),
-    (b"a\\\r\nb\\\nc\nd\n", [b"a\\\r\nb\\\nc\n", b"d\n"]), (b"a\\ b\n", [b"a\\ b\n"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "data, lines",
+    [
+        (b"a\nb\n", [b"a\n", b"b\n"]),
+        (b"a\nb", [b"a\n", b"b"]),
+        (b"a\\\nb\nc", [b"a\\\nb\n", b"c"]),
+        (b"", []),
+        (b"a\\\r\nb\\\nc\nd\n", [b"a\\\r\nb\\\nc\n", b"d\n"]),
+        (b"a\\ b\n", [b"a\\ b\n"]),
+    ],
+)
 def test_lines_go_on_after_a_backslash(data, lines):
     assert obj_text._logical_lines(data) == lines and b"".join(lines) == data
 
 
-@pytest.mark.parametrize("line, said", [
-    (b"f 1 2 3\n", [b"f", b"1", b"2", b"3"]), (b"v 1 2 # 3\n", [b"v", b"1", b"2"]), (b"# v 1\n", []),
-    (b"f 1 \\\n2 3\n", [b"f", b"1", b"2", b"3"]), (b"f 1 \\\r\n 2\n", [b"f", b"1", b"2"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "line, said",
+    [
+        (b"f 1 2 3\n", [b"f", b"1", b"2", b"3"]),
+        (b"v 1 2 # 3\n", [b"v", b"1", b"2"]),
+        (b"# v 1\n", []),
+        (b"f 1 \\\n2 3\n", [b"f", b"1", b"2", b"3"]),
+        (b"f 1 \\\r\n 2\n", [b"f", b"1", b"2"]),
+    ],
+)
 def test_words_are_what_is_said_before_a_comment(line, said):
     assert obj_text.words(line) == said
 
 
-@pytest.mark.parametrize("corners, found", [
-    ([b"1", b"-2"], [[1, 0], [-2, 0]]), ([b"1/2", b"3/-4"], [[1, 2], [3, -4]]), ([b"1//2", b"3//4"], [[1, 0], [3, 0]]),
-    ([b"1/2/3", b"4/5/6"], [[1, 2], [4, 5]]), ([b"1/2", b"3", b"4//5"], [[1, 2], [3, 0], [4, 0]]),
-    ([b"x/2", b"3/y"], [[0, 2], [3, 0]]), ([b"123456789012345678901/1"], [[0, 1]]), ([b"1/2/3/4"], [[1, 2]]), ([], []),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "corners, found",
+    [
+        ([b"1", b"-2"], [[1, 0], [-2, 0]]),
+        ([b"1/2", b"3/-4"], [[1, 2], [3, -4]]),
+        ([b"1//2", b"3//4"], [[1, 0], [3, 0]]),
+        ([b"1/2/3", b"4/5/6"], [[1, 2], [4, 5]]),
+        ([b"1/2", b"3", b"4//5"], [[1, 2], [3, 0], [4, 0]]),
+        ([b"x/2", b"3/y"], [[0, 2], [3, 0]]),
+        ([b"123456789012345678901/1"], [[0, 1]]),
+        ([b"1/2/3/4"], [[1, 2]]),
+        ([], []),
+    ],
+)
 def test_corners_say_vertices_and_uvs(corners, found):
     assert obj_text._indices(corners).tolist() == found
 
@@ -61,11 +83,17 @@ def test_uvs_that_lack_numbers_are_zero_there():
         obj_text._numbers([b"v 1 2\n"], 3)
 
 
-@pytest.mark.parametrize("line, uvs, count, new", [
-    (b"f 1/9 2/9 3/9\n", [0, 4, -1], 5, b"f 1/1 2/5 3/9\n"), (b"f 1 2 3\r\n", [0, 1, 2], 3, b"f 1/1 2/2 3/3\r\n"),
-    (b"f 1//7 2//7\n", [3, -1], 9, b"f 1/4/7 2//7\n"), (b"f -1/-2 -3/1\n", [4, 4], 6, b"f -1/-2 -3/5\n"),
-    (b"f  1/9   2/9 # both\n", [1, -1], 5, b"f  1/2   2/9 # both\n"), (b"f -1 -2\n", [2, 0], 3, b"f -1/-1 -2/-3\n"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "line, uvs, count, new",
+    [
+        (b"f 1/9 2/9 3/9\n", [0, 4, -1], 5, b"f 1/1 2/5 3/9\n"),
+        (b"f 1 2 3\r\n", [0, 1, 2], 3, b"f 1/1 2/2 3/3\r\n"),
+        (b"f 1//7 2//7\n", [3, -1], 9, b"f 1/4/7 2//7\n"),
+        (b"f -1/-2 -3/1\n", [4, 4], 6, b"f -1/-2 -3/5\n"),
+        (b"f  1/9   2/9 # both\n", [1, -1], 5, b"f  1/2   2/9 # both\n"),
+        (b"f -1 -2\n", [2, 0], 3, b"f -1/-1 -2/-3\n"),
+    ],
+)
 def test_faces_get_other_numbers_of_uvs_and_keep_the_rest(line, uvs, count, new):
     assert obj._face(line, uvs, count) == new
 
@@ -80,8 +108,14 @@ def test_lines_of_uvs_keep_what_stays_and_end_as_those_beside():
 
 
 def text_of(**given):
-    fields = {"uv": np.zeros((4, 2)), "uv_line": np.array([1, 2, 3, 9]), "corner_uv": np.array([0, 1, 1, 2, -1]),
-              "face_line": np.array([5, 6, 20]), "last_vertex": np.array([0, 0, 15]), "has_surfaces": False}  # fmt: skip
+    fields = {
+        "uv": np.zeros((4, 2)),
+        "uv_line": np.array([1, 2, 3, 9]),
+        "corner_uv": np.array([0, 1, 1, 2, -1]),
+        "face_line": np.array([5, 6, 20]),
+        "last_vertex": np.array([0, 0, 15]),
+        "has_surfaces": False,
+    }
     return SimpleNamespace(**fields | given)
 
 
@@ -110,8 +144,10 @@ def test_the_first_face_of_each_group():
     assert obj._first_lines(text, here, np.array([1, 0, 1, 2, 0]), 4).tolist() == [1, 0, 2, 3]
 
 
-HEADER = b"ply\nformat %s 1.0\nelement vertex 2\nproperty float x\nproperty double y\nelement face 2\n" \
-         b"property list uchar int vertex_indices\nproperty uchar flag\nend_header\n"  # fmt: skip
+HEADER = (
+    b"ply\nformat %s 1.0\nelement vertex 2\nproperty float x\nproperty double y\nelement face 2\n"
+    b"property list uchar int vertex_indices\nproperty uchar flag\nend_header\n"
+)
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -130,7 +166,9 @@ def test_rows_of_bytes_are_where_their_sizes_say(order, even):
     assert rows["vertex"].start.tolist() == [header.size + 12 * k for k in range(3)]
     assert ply_rows.scalars(data, header, vertex, rows["vertex"], "y").tolist() == [2.5, 4.5]
     assert rows["face"].count["vertex_indices"].tolist() == [len(of) for of in lists]
-    assert ply_rows.lists(data, header, face, rows["face"], "vertex_indices").tolist() == sum(lists, [])
+    assert ply_rows.lists(data, header, face, rows["face"], "vertex_indices").tolist() == [
+        v for each in lists for v in each
+    ]
     assert ply_rows.scalars(data, header, face, rows["face"], "flag").tolist() == [40, 41]
     assert rows["face"].start[-1] == len(data)
     assert (ply_rows._even_layout(data, int(rows["face"].start[0]), face, order) is not None) == even
@@ -159,12 +197,19 @@ def test_rows_of_texts_are_lines():
             ply_rows.read_rows(HEADER % b"ascii" + b"1 2\n3 4\n3 5 6 7 40\n" + bad, header, {"face"})
 
 
-@pytest.mark.parametrize("change, words", [
-    ((b"end_header\n", b""), "does not end"), ((b"ply", b"plx"), "lacks a format"), ((b"format ascii 1.0\n", b""), "lacks a format"),
-    ((b"format ascii", b"format other"), "has a line 'format other 1.0'"), ((b"vertex 2", b"vertex x"), "has a line 'element"),
-    ((b"vertex 2", b"vertex -2"), "more than"), ((b"vertex 2", b"vertex 99999"), "more than"),
-    ((b"property float x", b"property what x"), "has a line 'property what x'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ((b"end_header\n", b""), "does not end"),
+        ((b"ply", b"plx"), "lacks a format"),
+        ((b"format ascii 1.0\n", b""), "lacks a format"),
+        ((b"format ascii", b"format other"), "has a line 'format other 1.0'"),
+        ((b"vertex 2", b"vertex x"), "has a line 'element"),
+        ((b"vertex 2", b"vertex -2"), "more than"),
+        ((b"vertex 2", b"vertex 99999"), "more than"),
+        ((b"property float x", b"property what x"), "has a line 'property what x'"),
+    ],
+)
 def test_headers_are_refused_by_the_line(change, words):
     with pytest.raises(InPlaceError, match=words):
         ply_rows.read_header((HEADER % b"ascii").replace(*change))
@@ -248,17 +293,36 @@ def test_uvs_are_numbered_by_all_their_columns():
     assert found[0] == found[2] and len(set(found.tolist())) == 3
 
 
-@pytest.mark.parametrize("name, here, called", [
-    ("Body", "Body", True), ("Body", "Body.001", True), ("Body", "Body.01", False), ("Body", "Bodya", False),
-    ("Body.001", "Body.001", True), ("x" * 70, "x" * 63, True), ("x" * 70, "x" * 59 + ".001", True), ("x" * 70, "x" * 40, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, here, called",
+    [
+        ("Body", "Body", True),
+        ("Body", "Body.001", True),
+        ("Body", "Body.01", False),
+        ("Body", "Bodya", False),
+        ("Body.001", "Body.001", True),
+        ("x" * 70, "x" * 63, True),
+        ("x" * 70, "x" * 59 + ".001", True),
+        ("x" * 70, "x" * 40, False),
+    ],
+)
 def test_meshes_are_called_as_blender_may_have_called_them(name, here, called):
     assert glb._is_called(name, here) == called
 
 
 def test_meshes_come_in_the_order_of_the_nodes():
-    doc = {"meshes": [{}] * 6, "scenes": [{"nodes": [2, 0]}, {"nodes": [5]}], "nodes": [
-        {"mesh": 1, "children": [1, 3]}, {"mesh": 3}, {"mesh": 4, "skin": 0}, {"mesh": 2}, {"mesh": 0}, {"mesh": 4}]}  # fmt: skip
+    doc = {
+        "meshes": [{}] * 6,
+        "scenes": [{"nodes": [2, 0]}, {"nodes": [5]}],
+        "nodes": [
+            {"mesh": 1, "children": [1, 3]},
+            {"mesh": 3},
+            {"mesh": 4, "skin": 0},
+            {"mesh": 2},
+            {"mesh": 0},
+            {"mesh": 4},
+        ],
+    }
     own = glb._Meshes(glb_data.Glb(doc, b"", []))
     assert own.order == [4, 1, 3, 2, 0, 5] and own.skinned == {4}
     alone = glb._Meshes(glb_data.Glb({"meshes": [{}] * 2, "nodes": [{"mesh": 1}, {"mesh": 0}]}, b"", []))
@@ -277,8 +341,11 @@ def test_uvs_of_corners_are_turned_over_and_those_that_stay_keep_their_bits():
 
 
 def test_views_are_mentioned_wherever_they_stand():
-    doc = {"accessors": [{"bufferView": 3}, {"sparse": {"indices": {"bufferView": 1}}}], "images": [{"bufferView": "x"}],
-           "other": {"bufferView": 5, "list": [[{"bufferView": 7}]]}}  # fmt: skip
+    doc = {
+        "accessors": [{"bufferView": 3}, {"sparse": {"indices": {"bufferView": 1}}}],
+        "images": [{"bufferView": "x"}],
+        "other": {"bufferView": 5, "list": [[{"bufferView": 7}]]},
+    }
     assert sorted(glb_data.mentions(doc)) == [1, 3, 5, 7]
 
 
@@ -286,13 +353,20 @@ def ply_bytes(text, body=b""):
     return b"ply\nformat " + text + b"\nend_header\n" + body
 
 
-@pytest.mark.parametrize("begin, body, faces", [
-    (b"ascii 1.0\nelement vertex 1\nproperty float x\nelement face 1\nproperty list uchar int i", b"1 3", 1),
-    (b"ascii 1.0\nelement vertex 2\nproperty float x\nelement face 1\nproperty list uchar int i", b"1 2 3", 1),
-    (b"binary_little_endian 1.0\nelement vertex 2\nproperty float x\nproperty double y\nelement face 3\nproperty list ushort int i",
-     b"x" * 30, 3),
-    (b"binary_little_endian 1.0\nelement vertex 2\nproperty float x", b"x" * 8, None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "begin, body, faces",
+    [
+        (b"ascii 1.0\nelement vertex 1\nproperty float x\nelement face 1\nproperty list uchar int i", b"1 3", 1),
+        (b"ascii 1.0\nelement vertex 2\nproperty float x\nelement face 1\nproperty list uchar int i", b"1 2 3", 1),
+        (
+            b"binary_little_endian 1.0\nelement vertex 2\nproperty float x\nproperty double y\n"
+            b"element face 3\nproperty list ushort int i",
+            b"x" * 30,
+            3,
+        ),
+        (b"binary_little_endian 1.0\nelement vertex 2\nproperty float x", b"x" * 8, None),
+    ],
+)
 def test_headers_of_ply_declare_no_more_than_there_is(begin, body, faces):
     data = ply_bytes(begin, body)
     assert headers._ply(data, len(data)) == faces
@@ -332,20 +406,27 @@ def test_buffers_of_a_text_are_beside_it_and_as_long_as_it_says(tmp_path):
         )
         headers._gltf(path)
 
-    with pytest.raises(ValueError, match="it needs b c.bin, which is not there"):
+    with pytest.raises(ValueError, match=r"it needs b c\.bin, which is not there"):
         check(3)
     there.write_bytes(b"abc")
     check(3)
-    with pytest.raises(ValueError, match="it declares 4 bytes of b c.bin, which has 3"):
+    with pytest.raises(ValueError, match=r"it declares 4 bytes of b c\.bin, which has 3"):
         check(4)
     path.write_text("[")
     headers._gltf(path)
 
 
-@pytest.mark.parametrize("line, words", [
-    ("2 0 1", "fewer than three"), ("4 0 1 2", "fewer than it says"), ("3 0 1 3", "does not exist"), ("3 -1 1 2", "does not exist"),
-    ("3 0 1 2 255 0 0", None), ("-1", "fewer than three"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "line, words",
+    [
+        ("2 0 1", "fewer than three"),
+        ("4 0 1 2", "fewer than it says"),
+        ("3 0 1 3", "does not exist"),
+        ("3 -1 1 2", "does not exist"),
+        ("3 0 1 2 255 0 0", None),
+        ("-1", "fewer than three"),
+    ],
+)
 def test_faces_of_off_have_corners_that_exist(line, words):
     if words is None:
         assert off._face(5, line.split(), 3) == (0, 1, 2)
@@ -397,5 +478,5 @@ def test_counts_of_fbx_are_those_of_its_arrays(long):
     assert (found.vertices, found.corners, found.uv_corners) == (4, 7, 7)
     assert found.kinds["Model Mesh"] == 2 and found.kinds["Model Light"] == 1 and found.kinds["Geometry Mesh"] == 1
     for bad in (data[:-30], data[:40], b"x" + data[1:], data[:26]):
-        with pytest.raises(fbx_nodes.FileError, match="too early|no binary FBX"):
+        with pytest.raises(fbx_nodes.FileError, match=r"too early|no binary FBX"):
             fbx_nodes.count(bad)

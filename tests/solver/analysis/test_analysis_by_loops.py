@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import meshes
@@ -61,10 +62,17 @@ def test_densities_vary_by_a_million_at_most(contrast, good):
         assert error.value.elements.tolist() == [0] and error.value.kind == "face"
 
 
-@pytest.mark.parametrize("weights, error, elements", [
-    ([0, 0.5, 1], None, None), ([0, np.nan, np.inf], WeightError, [1, 2]), ([-0.01, 0, 1.01], WeightError, [0, 2]),
-    ([0, 0, 0], NoRegionError, []), ([0.5, 0.5, 0.5], UniformWeightsError, []), ([1, 1, 1], UniformWeightsError, []),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "weights, error, elements",
+    [
+        ([0, 0.5, 1], None, None),
+        ([0, np.nan, np.inf], WeightError, [1, 2]),
+        ([-0.01, 0, 1.01], WeightError, [0, 2]),
+        ([0, 0, 0], NoRegionError, []),
+        ([0.5, 0.5, 0.5], UniformWeightsError, []),
+        ([1, 1, 1], UniformWeightsError, []),
+    ],
+)
 def test_weights_of_regions_are_told_what_is_wrong(weights, error, elements):
     if error is None:
         assert density.check_region(weights).tolist() == weights
@@ -236,9 +244,15 @@ def test_steps_are_smooth_between_their_ends(value, step):
     assert seam_costs._step(np.array([value]), (1.0, 3.0))[0] == pytest.approx(step)
 
 
-@pytest.mark.parametrize("residual, normal, chance", [
-    (1.01, (0, 0, 1), True), (0.99, (0, 0, 1), False), (1.01, (1, 0, 0), False), (1.01, (0, 0.05, 0.999), True),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "residual, normal, chance",
+    [
+        (1.01, (0, 0, 1), True),
+        (0.99, (0, 0, 1), False),
+        (1.01, (1, 0, 0), False),
+        (1.01, (0, 0.05, 0.999), True),
+    ],
+)
 def test_a_mirror_of_above_and_below_that_is_not_quite_one_is_chance(residual, normal, chance):
     plane = SimpleNamespace(residual=residual * seam_costs.CHANCE, normal=np.array(normal, float))
     assert seam_costs._is_chance(plane, SimpleNamespace(up=(0, 0, 2))) == chance
@@ -310,9 +324,7 @@ def test_the_best_path_is_cheapest_with_its_turns():
     beside = {v: [u for e in of for u in e if v in e and u != v] for v in range(16)}
 
     def price(path, turn):
-        steps = [
-            np.linalg.norm(V[b] - V[a]) * of[tuple(sorted((a, b)))] for a, b in zip(path[:-1], path[1:], strict=True)
-        ]
+        steps = [np.linalg.norm(V[b] - V[a]) * of[tuple(sorted((a, b)))] for a, b in pairwise(path)]
         total = sum(steps)
         for k in range(1, len(path) - 1):
             one, two = V[path[k]] - V[path[k - 1]], V[path[k + 1]] - V[path[k]]

@@ -96,7 +96,7 @@ def test_planes_part_triangles_by_the_widest_gap(seed):
                 best = max(best, (b @ n).min() - (a @ n).max())
         assert between == pytest.approx(best) and gap[k] == pytest.approx(np.clip(best, 0, 0.02 * size))
         wide += best > 0
-    assert 10 < wide
+    assert wide > 10
 
 
 def test_planes_of_triangles_with_a_common_vertex_go_through_it():
@@ -168,8 +168,12 @@ def test_parts_that_would_meet_others_stay_where_they_were(meets):
         return np.array([2]) if hit else np.array([], int)
 
     pairs = SimpleNamespace(corners=np.zeros((0, 4), int))
-    problem = SimpleNamespace(goal=goal, meeting=meeting, near=lambda at: SimpleNamespace(pairs=pairs),
-                              crossings=SimpleNamespace(faces=SimpleNamespace(triangles=triangles)))  # fmt: skip
+    problem = SimpleNamespace(
+        goal=goal,
+        meeting=meeting,
+        near=lambda at: SimpleNamespace(pairs=pairs),
+        crossings=SimpleNamespace(faces=SimpleNamespace(triangles=triangles)),
+    )
     found = barrier._ahead(problem, start)
     expected = {0: goal, 1: np.concatenate([goal[:4], start[4:8], goal[8:]]), 9: start}[meets]
     np.testing.assert_allclose(found, expected, atol=1e-9)

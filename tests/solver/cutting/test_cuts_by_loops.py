@@ -95,7 +95,7 @@ def test_a_stretch_is_one_while_it_is_cut_and_nothing_branches_off_inside():
     less = cut.copy()
     less[middle[0]] = False
     assert not cut_graph._is_stretch(component, less, middle)
-    inner = [v for v in np.unique(component.ends[middle]) if abs(component.positions[v, 0] - 0.5) < 1e-9][0]
+    inner = next(v for v in np.unique(component.ends[middle]) if abs(component.positions[v, 0] - 0.5) < 1e-9)
     branch = [e for e in np.flatnonzero((component.ends == inner).any(axis=1)) if e not in middle]
     more = cut.copy()
     more[branch[0]] = True
@@ -114,7 +114,7 @@ def test_the_shortest_bridge_joins_both_boundaries(longest, found):
     none = np.zeros(len(component.pair), bool)
     assert cut_graph._shortest_bridge(component, none, np.zeros(0, int), 9.0) is None
     # With a tip inside there are two boundaries, and the nearer side is half as far.
-    inner = [v for v in range(len(V)) if v not in loop and abs(V[v, 0] - 2) < 1e-9][0]
+    inner = next(v for v in range(len(V)) if v not in loop and abs(V[v, 0] - 2) < 1e-9)
     tip = at_place(component, V)[[inner]]
     path = cut_graph._shortest_bridge(component, none, tip, 0.5 * longest)
     assert (path is not None) == found
@@ -318,13 +318,21 @@ def test_items_stand_by_component():
     assert order.tolist() == [1, 3, 2, 0, 4, 5] and start.tolist() == [0, 2, 3, 6, 6]
 
 
-@pytest.mark.parametrize("given, words", [
-    ((True, 0, 0, 0, 0), ["many handles"]), ((False, 1, 0, 0, 0), ["A face looks to the other side than"]),
-    ((False, 3, 0, 0, 0), ["3 faces look to the other side than"]), ((False, 0, 1, 0, 0), ["one side only, a face looks"]),
-    ((False, 0, 2, 0, 0), ["one side only, 2 faces look"]), ((False, 0, 0, 5, 0), ["5 holes are filled"]),
-    ((False, 0, 0, 1, 0), ["A hole is filled"]), ((False, 0, 0, 0, 4), ["4 boundary vertices lie"]), ((False, 0, 0, 0, 0), []),
-    ((True, 1, 1, 1, 1), ["many handles", "A face", "one side", "A hole", "1 boundary"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        ((True, 0, 0, 0, 0), ["many handles"]),
+        ((False, 1, 0, 0, 0), ["A face looks to the other side than"]),
+        ((False, 3, 0, 0, 0), ["3 faces look to the other side than"]),
+        ((False, 0, 1, 0, 0), ["one side only, a face looks"]),
+        ((False, 0, 2, 0, 0), ["one side only, 2 faces look"]),
+        ((False, 0, 0, 5, 0), ["5 holes are filled"]),
+        ((False, 0, 0, 1, 0), ["A hole is filled"]),
+        ((False, 0, 0, 0, 4), ["4 boundary vertices lie"]),
+        ((False, 0, 0, 0, 0), []),
+        ((True, 1, 1, 1, 1), ["many handles", "A face", "one side", "A hole", "1 boundary"]),
+    ],
+)
 def test_each_thing_that_was_done_has_its_warning(given, words):
     found = list(cuts._warnings(*given))
     assert len(found) == len(words) and all(word in text for word, text in zip(words, found, strict=True))

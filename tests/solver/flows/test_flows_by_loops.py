@@ -11,7 +11,6 @@ import scipy.sparse as sp
 
 from omt_uv.solver.flows import creases, flow_map, kernel
 from omt_uv.solver.flows import shape as shapes
-from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.kernel import FlowField
 
 
@@ -121,10 +120,17 @@ class Crossings:
         return pairs[pairs[:, 0] != 0] if len(pairs) else pairs
 
 
-@pytest.mark.parametrize("rounds, steps, left", [
-    ([[]], 0, 0), ([[[1, 2]], []], 1, 0), ([[[1, 2]], [[1, 2]]], 1, 1), ([[[1, 2]], [[3, 4]], []], 2, 0),
-    ([[[1, 2], [0, 3]], [[0, 3]]], 1, 0), ([[[1, 2]], [[1, 2], [3, 4]], [[1, 2], [3, 4]]], 2, 1),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "rounds, steps, left",
+    [
+        ([[]], 0, 0),
+        ([[[1, 2]], []], 1, 0),
+        ([[[1, 2]], [[1, 2]]], 1, 1),
+        ([[[1, 2]], [[3, 4]], []], 2, 0),
+        ([[[1, 2], [0, 3]], [[0, 3]]], 1, 0),
+        ([[[1, 2]], [[1, 2], [3, 4]], [[1, 2], [3, 4]]], 2, 1),
+    ],
+)
 def test_what_meets_is_taken_apart_round_by_round_and_the_best_is_kept(rounds, steps, left, monkeypatch):
     before = np.zeros((9, 3))
     after, triangles = before + 1.0, np.arange(9).reshape(3, 3).repeat(3, axis=0)

@@ -318,7 +318,7 @@ def test_surfaces_to_unwrap_are_somewhere():
     with pytest.raises(NonFiniteError) as error:
         surface.chosen_triangles(triangle_surface(V, F), None)
     assert error.value.elements.tolist() == [F[0][0]] and error.value.kind == "vertex"
-    others = ~(F == F[0][0]).any(axis=1)
+    others = ~(F[0][0] == F).any(axis=1)
     faces, triangles, owner = surface.chosen_triangles(triangle_surface(V, F), others)
     np.testing.assert_array_equal(owner, np.flatnonzero(others))
     np.testing.assert_array_equal(F.ravel()[triangles], F[others])

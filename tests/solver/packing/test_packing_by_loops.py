@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,7 +89,7 @@ def test_blocks_are_rows_of_rectangles_about_as_wide_as_high(seed):
             apart = (found.corners[i] >= ends[j] - 1e-9) | (found.corners[j] >= ends[i] - 1e-9)
             assert apart.any()
     rows = np.unique(found.corners[:, 1])
-    for low, high in zip(rows[:-1], rows[1:], strict=True):
+    for low, high in pairwise(rows):
         row = found.corners[:, 1] == low
         assert high - low == pytest.approx(sizes[row, 1].max()) and found.corners[row, 0].min() == 0
         # The first of the next row would not have had room.
@@ -108,8 +109,17 @@ def test_places_near_by_have_the_fewest_folds():
 
 
 def task_of(**given):
-    fields = {"raster": 64, "areas": np.array([100.0, 50]), "sizes": np.array([[10.0, 10], [5, 10]]), "growth": 1.0,
-              "outlines": [1, 2], "margin": 3.0, "staying": [], "tries": (8, 3), "texture_size": 1024}  # fmt: skip
+    fields = {
+        "raster": 64,
+        "areas": np.array([100.0, 50]),
+        "sizes": np.array([[10.0, 10], [5, 10]]),
+        "growth": 1.0,
+        "outlines": [1, 2],
+        "margin": 3.0,
+        "staying": [],
+        "tries": (8, 3),
+        "texture_size": 1024,
+    }
     return SimpleNamespace(**fields | given)
 
 

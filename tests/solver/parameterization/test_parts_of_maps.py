@@ -77,12 +77,15 @@ def test_what_is_missing_is_the_excess_times_the_area_of_what_is_searched():
     assert one.excess == pytest.approx(0.4 / 8)
 
 
-@pytest.mark.parametrize("now, then, hardly", [
-    ([1.60], [1.61], True),
-    ([1.36], [1.61], False),
-    ([1.60], [1.90], False),
-    ([1.358], [1.359], False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "now, then, hardly",
+    [
+        ([1.60], [1.61], True),
+        ([1.36], [1.61], False),
+        ([1.60], [1.90], False),
+        ([1.358], [1.359], False),
+    ],
+)
 def test_a_round_is_hardly_better_where_as_much_misses_the_bound_by_much(now, then, hardly):
     assert round_of([1], now).is_hardly_better(round_of([1], then)) == hardly
 
@@ -92,9 +95,17 @@ def test_a_round_in_which_more_area_keeps_the_bound_is_better():
     assert not round_of([1, 1], [1.2, 1.85]).is_hardly_better(round_of([1, 1], [1.6, 1.6]))
 
 
-@pytest.mark.parametrize("mean, steep, pressing", [
-    (1.2, 0.0, 1.2), (1.2, 0.01, 1.2), (1.2, 0.02, 1.5 * 1.02), (1.0, 0.5, 1.0), (1.9, 0.5, 1.5 * 1.5), (3.0, 0.5, 3.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "mean, steep, pressing",
+    [
+        (1.2, 0.0, 1.2),
+        (1.2, 0.01, 1.2),
+        (1.2, 0.02, 1.5 * 1.02),
+        (1.0, 0.5, 1.0),
+        (1.9, 0.5, 1.5 * 1.5),
+        (3.0, 0.5, 3.0),
+    ],
+)
 def test_what_is_steep_presses_as_if_the_mean_missed_the_bound(mean, steep, pressing):
     assert shear_search.pressing_shear(mean, steep, 1.5) == pytest.approx(pressing)
 
@@ -150,8 +161,13 @@ def test_outlines_are_as_long_as_the_edges_around_both_sides_of_a_slit():
 
 
 def search_of(**given):
-    fields = {"surface": SimpleNamespace(face_start=np.arange(0, 31, 3)), "faces": None, "shear": ShearBound(1.35),
-              "target": None, "cutting": {}}  # fmt: skip
+    fields = {
+        "surface": SimpleNamespace(face_start=np.arange(0, 31, 3)),
+        "faces": None,
+        "shear": ShearBound(1.35),
+        "target": None,
+        "cutting": {},
+    }
     return shear_search.ShearSearch(**fields | given)
 
 
@@ -196,26 +212,41 @@ def test_only_one_of_two_twins_is_searched_and_both_are_cut(monkeypatch):
     monkeypatch.setattr(shear_search.ShearSearch, "search", lambda self, spread: SimpleNamespace(spread=spread))
     search = search_of()
     search.__dict__["images"] = SimpleNamespace(exact=np.array([3, 4, 5, 0, 1, 2, 6, 7, 8, 9]), are_exact=True)
-    charts = [SimpleNamespace(vertex_ids=np.array([0, 1, 2]), faces=np.array([0, 1])),
-              SimpleNamespace(vertex_ids=np.array([3, 4, 5]), faces=np.array([2, 3]))]  # fmt: skip
+    charts = [
+        SimpleNamespace(vertex_ids=np.array([0, 1, 2]), faces=np.array([0, 1])),
+        SimpleNamespace(vertex_ids=np.array([3, 4, 5]), faces=np.array([2, 3])),
+    ]
     found = drain(search.again(np.array([[8, 9]]), charts, np.arange(10.0), {}))
     np.testing.assert_array_equal(asked[0][1], [0, 1] + [np.inf] * 8)
     assert asked[1][0] == [[8, 9], [0, 1], [2, 9], [3, 4]] and np.isinf(asked[1][1]).all()
     assert found.cuts.edges.tolist() == [[0, 1], [2, 9], [3, 4], [7, 8]]
 
 
-@pytest.mark.parametrize("mean, late, rounds, may", [
-    (1.35 * 1.011, True, 1, True), (1.35 * 1.009, True, 1, False), (1.35 * 1.011, False, 1, False),
-    (1.35**1.17, False, 1, True), (1.35**1.15, False, 1, False), (1.0, False, 3, True), (1.0, False, 2, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "mean, late, rounds, may",
+    [
+        (1.35 * 1.011, True, 1, True),
+        (1.35 * 1.009, True, 1, False),
+        (1.35 * 1.011, False, 1, False),
+        (1.35**1.17, False, 1, True),
+        (1.35**1.15, False, 1, False),
+        (1.0, False, 3, True),
+        (1.0, False, 2, False),
+    ],
+)
 def test_charts_may_cross_themselves_where_they_miss_the_bound_by_much_or_late(mean, late, rounds, may):
     assert shear_bound._may_cross(round_of([1], [mean]), 0, late, rounds) == may
 
 
-@pytest.mark.parametrize("pressing, sparing, after, taken", [
-    (1.35 * 1.04, True, 1.3, True), (1.35 * 1.06, True, 1.3, False), (1.35 * 1.04, True, 1.42, False),
-    (1.35 * 1.04, False, 1.3, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "pressing, sparing, after, taken",
+    [
+        (1.35 * 1.04, True, 1.3, True),
+        (1.35 * 1.06, True, 1.3, False),
+        (1.35 * 1.04, True, 1.42, False),
+        (1.35 * 1.04, False, 1.3, False),
+    ],
+)
 def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
     pressing, sparing, after, taken, monkeypatch
 ):
@@ -256,9 +287,16 @@ def test_a_round_is_made_shorter_only_within_the_bound(excess, monkeypatch):
     assert calls == (["_with_areas_spared"] if excess else ["_taken_back", "_parts_cut_anew"])
 
 
-@pytest.mark.parametrize("outcomes, kept", [
-    ([[1.3]], 0), ([[1.5], [1.3]], 1), ([[1.5], [1.4]], None), ([None], None), (["last"], None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "outcomes, kept",
+    [
+        ([[1.3]], 0),
+        ([[1.5], [1.3]], 1),
+        ([[1.5], [1.4]], None),
+        ([None], None),
+        (["last"], None),
+    ],
+)
 def test_shorter_cuts_are_taken_where_they_keep_the_bound(outcomes, kept, monkeypatch):
     memory = {"it": SimpleNamespace(polygons=np.array([0]), rehearsed=1.0)}
     charts = [chart_of(*meshes.single_triangle())]
@@ -308,11 +346,14 @@ def test_maps_of_pieces_shear_less_in_the_mean_by_area():
     assert not shear_bound._shears_less(charts, before, before)
 
 
-@pytest.mark.parametrize("mean, by_hand, words", [
-    ([1.354, 1.0], [False, False], []),
-    ([1.356, 1.0], [False, False], ["An island, 25 % of the surface, shears 1.36 in the mean, above 1.35: why"]),
-    ([1.5, 1.7], [False, False], ["2 islands shear 1.7 in the mean, above 1.35: why"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "mean, by_hand, words",
+    [
+        ([1.354, 1.0], [False, False], []),
+        ([1.356, 1.0], [False, False], ["An island, 25 % of the surface, shears 1.36 in the mean, above 1.35: why"]),
+        ([1.5, 1.7], [False, False], ["2 islands shear 1.7 in the mean, above 1.35: why"]),
+    ],
+)
 def test_warnings_of_the_bound_tell_how_much_of_the_surface_misses_it(mean, by_hand, words):
     found = list(ShearBound(1.35).missed(np.array(mean), np.array([1.0, 3.0]), np.array(by_hand), "why"))
     assert found == words
@@ -334,9 +375,14 @@ def test_only_free_maps_of_seams_that_are_searched_have_a_bound(changed):
     assert UnwrapOptions(**{"max_shear": 1.4} | changed).shear_bound() is None
 
 
-@pytest.mark.parametrize("name, good, bad", [
-    ("balance", (0, 1), (-0.001, 1.001)), ("aspect", (0, 9999), (-0.001, 10_000)), ("max_shear", (0, 1.01), (1.0, 0.9)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name, good, bad",
+    [
+        ("balance", (0, 1), (-0.001, 1.001)),
+        ("aspect", (0, 9999), (-0.001, 10_000)),
+        ("max_shear", (0, 1.01), (1.0, 0.9)),
+    ],
+)
 def test_numbers_of_options_end_where_they_say(name, good, bad):
     for value in good:
         assert getattr(UnwrapOptions(**{name: value}), name) == value
@@ -357,10 +403,16 @@ def flat_uv(disk):
     return disk.vertices[:, :2].copy()
 
 
-@pytest.mark.parametrize("spread, one, large, found", [
-    (False, True, False, None), (True, True, False, "flat"), (True, False, False, "embedded"),
-    (True, False, True, "bent"), (True, False, "unbent", "embedded"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "spread, one, large, found",
+    [
+        (False, True, False, None),
+        (True, True, False, "flat"),
+        (True, False, False, "embedded"),
+        (True, False, True, "bent"),
+        (True, False, "unbent", "embedded"),
+    ],
+)
 def test_a_flat_start_is_bent_in_large_charts_and_a_mean_value_map_in_small(spread, one, large, found, monkeypatch):
     disk = disk_mesh()
     flat, bent = flat_uv(disk), flat_uv(disk) + 1
@@ -389,9 +441,15 @@ def test_a_disk_is_flattened_evenly_below_a_spread_by_the_mass_asked_for():
     assert initial_map._bent(disk) is None
 
 
-@pytest.mark.parametrize("hopeless, even, one, starts", [
-    (True, True, True, True), (False, True, True, False), (True, False, True, False), (True, True, False, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "hopeless, even, one, starts",
+    [
+        (True, True, True, True),
+        (False, True, True, False),
+        (True, False, True, False),
+        (True, True, False, False),
+    ],
+)
 def test_an_even_start_is_for_what_a_mean_value_map_leaves_hopeless(hopeless, even, one, starts, monkeypatch):
     disk = disk_mesh()
     monkeypatch.setattr(initial_map, "map_energy", lambda *_: 50.0 if hopeless else 49.9)
@@ -400,11 +458,22 @@ def test_an_even_start_is_for_what_a_mean_value_map_leaves_hopeless(hopeless, ev
     assert (initial_map._even_start(disk, None) == "even") == starts
 
 
-@pytest.mark.parametrize("changed, found", [
-    ({}, "flat"), ({"boundary": "disk"}, None), ({"least": 169}, None), ({"most": 168}, None), ({"most": 169}, "flat"),
-    ({"far": True}, None), ({"flat": False}, "evened"), ({"flat": False, "evened": None}, None), ({"above": 100}, "flat"),
-    ({"above": 100, "flat": False}, "evened"), ({"above": 100, "evened": None}, None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "changed, found",
+    [
+        ({}, "flat"),
+        ({"boundary": "disk"}, None),
+        ({"least": 169}, None),
+        ({"most": 168}, None),
+        ({"most": 169}, "flat"),
+        ({"far": True}, None),
+        ({"flat": False}, "evened"),
+        ({"flat": False, "evened": None}, None),
+        ({"above": 100}, "flat"),
+        ({"above": 100, "flat": False}, "evened"),
+        ({"above": 100, "evened": None}, None),
+    ],
+)
 def test_a_roomy_start_is_flat_or_evened_in_meshes_of_a_middle_size(changed, found, monkeypatch):
     disk = disk_mesh(changed.get("boundary", "free"))
     disk.__dict__["is_far"] = changed.get("far", False)
@@ -452,9 +521,14 @@ def test_what_comes_back_is_smoothed_at_the_scale_of_its_target():
     assert np.abs(share / share.mean() - 1) @ disk.target / disk.target.sum() <= 0.05
 
 
-@pytest.mark.parametrize("corners, aspect, domain", [
-    (None, 1.0, (1.0, 1.0)), (np.arange(4), 4.0, (0.5, 2.0)), (np.arange(4), 1.0, (1.0, 1.0)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "corners, aspect, domain",
+    [
+        (None, 1.0, (1.0, 1.0)),
+        (np.arange(4), 4.0, (0.5, 2.0)),
+        (np.arange(4), 1.0, (1.0, 1.0)),
+    ],
+)
 def test_domains_have_the_aspect_as_height_over_width(corners, aspect, domain):
     found = disk_mesh("rectangle", corners=corners, aspect=aspect).domain
     assert type(found).__name__ == ("Disk" if corners is None else "Rectangle")
@@ -469,18 +543,30 @@ def figures(**given):
     return SimpleNamespace(**{"folds": 0, "area_l1": 0.01, "area_sd": 0.02, "angle_mean": 1.2, "warnings": ()} | given)
 
 
-@pytest.mark.parametrize("folds, area, keeps", [
-    (1, 0.0, True), (2, 0.0, False), (0, 0.0219, True), (0, 0.0221, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "folds, area, keeps",
+    [
+        (1, 0.0, True),
+        (2, 0.0, False),
+        (0, 0.0219, True),
+        (0, 0.0221, False),
+    ],
+)
 def test_maps_are_kept_with_no_more_folds_and_about_the_areas(folds, area, keeps):
     assert convex_maps._keeps(figures(folds=folds, area_l1=area), figures(folds=1), 0.02) == keeps
     assert convex_maps._keeps(figures(area_l1=0.054), figures(area_l1=0.05), 0.02)
     assert not convex_maps._keeps(figures(area_l1=0.056), figures(area_l1=0.05), 0.02)
 
 
-@pytest.mark.parametrize("angle, area, folds, isometry", [
-    (1 + 5e-8, 5e-8, 0, True), (1 + 2e-7, 0, 0, False), (1, 2e-7, 0, False), (1, 0, 1, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "angle, area, folds, isometry",
+    [
+        (1 + 5e-8, 5e-8, 0, True),
+        (1 + 2e-7, 0, 0, False),
+        (1, 2e-7, 0, False),
+        (1, 0, 1, False),
+    ],
+)
 def test_isometries_have_neither_shear_nor_error_nor_folds(angle, area, folds, isometry):
     assert convex_maps._is_isometry(figures(angle_mean=angle, area_l1=area, folds=folds)) == isometry
 
@@ -610,9 +696,16 @@ def test_targets_of_images_are_compared_vertex_by_vertex(name, off, same):
     np.testing.assert_allclose(at, [values[(v == F).any(axis=1)].mean() for v in range(len(V))])
 
 
-@pytest.mark.parametrize("folds, area, goal, kept", [
-    (0, 0.02, 0.02, True), (1, 0.02, 0.02, False), (0, 0.031, 0.02, False), (0, 0.029, 0.02, True), (0, 0.04, 0.001, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "folds, area, goal, kept",
+    [
+        (0, 0.02, 0.02, True),
+        (1, 0.02, 0.02, False),
+        (0, 0.031, 0.02, False),
+        (0, 0.029, 0.02, True),
+        (0, 0.04, 0.001, False),
+    ],
+)
 def test_maps_of_mirrored_quads_are_measured_as_they_were_given(folds, area, goal, kept, monkeypatch):
     V, F = meshes.grid(2, 2)
     found = map_of(V[:, :2])

@@ -87,8 +87,11 @@ def test_edges_come_by_what_they_leave_of_missing_neighbours_and_length(collapse
     found = vertex_balance._best_edges(mesh, amount, collapse)
     tail, head = halfedges_of(F)
     twin = mesh.twin
-    expected = [h for h in range(len(tail)) if twin[h] > h and amount[tail[h]] > 0
-                and pair_keys(tail[[h]], head[[h]])[0] not in locked]  # fmt: skip
+    expected = [
+        h
+        for h in range(len(tail))
+        if twin[h] > h and amount[tail[h]] > 0 and pair_keys(tail[[h]], head[[h]])[0] not in locked
+    ]
     assert sorted(found.tolist()) == expected
     excess = np.bincount(tail, minlength=len(V)) - 6
     excess[tail[twin < 0]] += 3

@@ -33,8 +33,11 @@ def test_vertices_go_to_the_nearest_of_their_kind_and_edges_at_many_faces_are_de
     degree = np.bincount(F.ravel())
     for v in range(len(V)):
         around = sorted(set(F[(v == F).any(axis=1)].ravel().tolist()) - {v})
-        prices = {u: np.linalg.norm(V[u] - V[v]) * (1 + max(degree[u] + degree[v] - 13, 0))
-                  for u in around if kind[u] == kind[v]}  # fmt: skip
+        prices = {
+            u: np.linalg.norm(V[u] - V[v]) * (1 + max(degree[u] + degree[v] - 13, 0))
+            for u in around
+            if kind[u] == kind[v]
+        }
         if prices:
             assert parent[v] == min(prices, key=prices.get) and price[v] == pytest.approx(min(prices.values()))
         else:
@@ -197,13 +200,20 @@ def search_of(**given):
             of=lambda a, b: 1.0 + a + b, plane=None, in_face=np.array([True, False, False, True])
         ),
     }
-    return SeamSearch(**fields | given)  # fmt: skip
+    return SeamSearch(**fields | given)
 
 
-@pytest.mark.parametrize("polygons, marked, further, wants", [
-    ([0, 1], False, False, True), ([1, 2], False, False, False), ([1, -1], False, False, False), ([0], True, False, False),
-    ([0], True, True, True), ([2], True, True, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "polygons, marked, further, wants",
+    [
+        ([0, 1], False, False, True),
+        ([1, 2], False, False, False),
+        ([1, -1], False, False, False),
+        ([0], True, False, False),
+        ([0], True, True, True),
+        ([2], True, True, False),
+    ],
+)
 def test_components_are_searched_where_a_spread_is_asked_for_and_nothing_is_marked(polygons, marked, further, wants):
     assert search_of(further=further).wants(np.array(polygons), marked) == wants
 
@@ -242,8 +252,12 @@ def test_densities_of_a_coarse_surface_are_half_logarithms_about_their_mean():
     coarse = SimpleNamespace(kept=np.array([0, 3, 5]))
     assert search_of()._log_density(component, coarse) is None
     found = search_of(density=density)._log_density(component, coarse)
-    at = [np.mean([0.5 * np.log(density[p]) for p, t in zip(component.polygons, component.triangles, strict=True) if v in t])
-          for v in range(component.vertex_count)]  # fmt: skip
+    at = [
+        np.mean(
+            [0.5 * np.log(density[p]) for p, t in zip(component.polygons, component.triangles, strict=True) if v in t]
+        )
+        for v in range(component.vertex_count)
+    ]
     np.testing.assert_allclose(found, (np.array(at) - np.mean(at))[[0, 3, 5]])
 
 
@@ -267,12 +281,15 @@ def test_prices_are_those_of_what_keeps_what_is_asked_for():
     assert rehearsal._price(one, 0.3, 0.4) == pytest.approx(5 * 0.4**0.9)
 
 
-@pytest.mark.parametrize("values, best, asked", [
-    ({1.0: 0.4, 1.5: 0.1, 2.0: 0.1}, 1.0, [1.0]),  # the cheapest keeps it, and the next would be dearer
-    ({1.0: 0.9, 1.5: 0.4, 2.0: 0.4}, 1.5, [1.0, 1.5]),
-    ({1.0: 0.45, 1.5: 0.4, 2.0: 0.4}, 1.0, [1.0]),
-    ({1.0: None, 1.5: 0.4, 2.0: 0.1}, "score", [1.0, 1.5]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "values, best, asked",
+    [
+        ({1.0: 0.4, 1.5: 0.1, 2.0: 0.1}, 1.0, [1.0]),  # the cheapest keeps it, and the next would be dearer
+        ({1.0: 0.9, 1.5: 0.4, 2.0: 0.4}, 1.5, [1.0, 1.5]),
+        ({1.0: 0.45, 1.5: 0.4, 2.0: 0.4}, 1.0, [1.0]),
+        ({1.0: None, 1.5: 0.4, 2.0: 0.1}, "score", [1.0, 1.5]),
+    ],
+)
 def test_the_cut_is_best_that_costs_least_for_what_it_shears(values, best, asked):
     cuts = [coarse_cut_of(c, s) for c, s in ((2.0, 1.0), (1.0, 9.0), (1.5, 8.0))]
     told, heard = rehearsed(values)

@@ -80,9 +80,15 @@ def test_costs_are_means_of_half_squared_distances():
     assert dominitz_tannenbaum.transport_cost(p, q, weight) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("cheaper, folds, halvings", [
-    ([True], [0], 0), ([False, True], [0, 0], 1), ([True, True], [1, 0], 1), ([False] * 6, [0] * 6, None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "cheaper, folds, halvings",
+    [
+        ([True], [0], 0),
+        ([False, True], [0, 0], 1),
+        ([True, True], [1, 0], 1),
+        ([False] * 6, [0] * 6, None),
+    ],
+)
 def test_the_longest_time_is_taken_that_lowers_the_cost_and_folds_no_more(cheaper, folds, halvings, monkeypatch):
     V, F = meshes.icosphere(1)
     V = normalized(V)
@@ -209,9 +215,15 @@ def test_planes_of_images_are_found_and_others_at_right_angles(seed):
     assert other @ across == pytest.approx(0, abs=1e-9) and np.linalg.norm(other) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("found, method, flows", [
-    ("it", "newton", False), ("it", "flow", True), ("it", "moser", True), (None, "flow", False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "found, method, flows",
+    [
+        ("it", "newton", False),
+        ("it", "flow", True),
+        ("it", "moser", True),
+        (None, "flow", False),
+    ],
+)
 def test_only_the_flows_flow_and_only_from_a_conformal_map(found, method, flows, monkeypatch):
     def flow_map(*_):
         return "flow"
