@@ -390,9 +390,9 @@ def test_corners_share_a_uv_vertex_where_vertex_uvs_and_side_agree():
     vertex, first = subdivision._uv_vertices(corner, start, uv)
     assert len(first) == 6 and (corner[first][vertex] == corner).all()
     moved = uv.copy()
-    moved[4:] += [3 * subdivision.SAME_UV, 0]
+    moved[4:] += [3e-4, 0]
     assert len(subdivision._uv_vertices(corner, start, moved)[1]) == 8
-    moved[4:] = uv[4:] + [0.2 * subdivision.SAME_UV, 0]
+    moved[4:] = uv[4:] + [2e-5, 0]
     assert len(subdivision._uv_vertices(corner, start, moved)[1]) == 6
     # A polygon that lies the other way round has vertices of its own.
     over = uv.copy()
@@ -609,7 +609,7 @@ def test_cells_are_told_with_their_numbers_and_a_verb():
 
 def test_density_is_the_mean_weight_of_corners_and_never_nothing():
     weights, triangles = np.array([0, 0, 0, 1.0, -3]), np.array([[0, 1, 2], [1, 2, 3], [2, 3, 4]])
-    assert partition._density(weights, triangles) == pytest.approx([partition.LEAST_DENSITY, 1 / 3, 1 / 3])
+    assert partition._density(weights, triangles) == pytest.approx([1e-3, 1 / 3, 1 / 3])
 
 
 def test_borders_are_between_polygons_of_different_cells_inside():
