@@ -422,11 +422,7 @@ def test_charts_by_themselves_get_their_own_order_back(monkeypatch):
     )
 
     def map_symmetric(self, cuts):
-        return (
-            done([mapped(1.0) for _ in cuts.prepared.charts])
-            if False
-            else done([replace(mapped(), uv=c.vertices[:, :2].copy()) for c in cuts.prepared.charts])
-        )
+        return done([replace(mapped(), uv=c.vertices[:, :2].copy()) for c in cuts.prepared.charts])
 
     monkeypatch.setattr(unwrapping._Task, "map_symmetric", map_symmetric)
     (found,) = drain(task().map_charts([mixed]))
