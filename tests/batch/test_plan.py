@@ -70,8 +70,9 @@ def test_nothing_to_do_is_an_error(package, tmp_path, text):
     (tmp_path / "list.txt").write_text(text)
     with pytest.raises(module.BatchError, match="empty"):
         module.tasks_of(plan_of(package, tmp_path / "out"), tmp_path / "list.txt")
-    with pytest.raises(module.BatchError, match="no mesh"):
+    with pytest.raises(module.BatchError, match="no mesh") as caught:
         module.tasks_of(plan_of(package, tmp_path / "out"), tmp_path)
+    assert str(caught.value).startswith(f"{tmp_path}: there is no mesh")
     with pytest.raises(module.BatchError, match="neither"):
         module.tasks_of(plan_of(package, tmp_path / "out"), tmp_path / "none")
 

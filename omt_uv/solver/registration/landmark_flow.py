@@ -16,7 +16,7 @@ from ..progress import Progress, Steps
 from .carriers import InPlace
 from .surface_newton import LOOSE, Deformation, minimise_on, without_folds
 
-# Radians, or radii of the disk, that a landmark goes in a step at most.
+# Radians, or radii of the disk, that a landmark goes in a step at most, if it never has to stay behind.
 STRIDE = 0.03
 # Steps at least and at most.
 FEWEST = 4
@@ -59,8 +59,8 @@ def draw_landmarks(problem: Deformation, placed: InPlace, vertices: np.ndarray, 
         left = float(np.linalg.norm(move, axis=1).max(initial=0))
         if left < NEAR:
             break
-        share = max(1 / max(count - k, 1), min(1.0, STRIDE / left) if k >= count else 0.0)
-        field = _field(placed.positions, vertices, share * move)
+        # What had to stay behind has all of its way left in the end.
+        field = _field(placed.positions, vertices, move / max(count - k, 1))
         field[problem.held] = 0
         moved = problem.carrier.move(placed, field)
         placed = without_folds(problem, placed, moved)
