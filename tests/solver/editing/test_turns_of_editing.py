@@ -95,9 +95,10 @@ def test_vertices_slide_along_their_sides_and_corners_stay(shift):
             want = straight[k] + ((w[v] - straight[k]) * np.conj(sides[k])).real * sides[k]
             assert found.w[v] == pytest.approx(want)
     assert np.array_equal(found.w[:2], w[:2]) and found.kind == "sides" and found.centre == 0
-    # Steps along the boundary have the directions of the sides, and none at corners.
-    step = found.motion.directions if hasattr(found.motion, "directions") else None
-    assert step is None or np.allclose(np.abs(step), 1)
+    # Those between corners slide along their sides alone, corners stay, and all else is free.
+    assert found.motion.axis[loop[~corner]] == pytest.approx(sides[~corner])
+    assert found.motion.free[loop].tolist() == [[False, False] if c else [True, False] for c in corner.tolist()]
+    assert found.motion.free[:2].all() and (found.motion.axis[:2] == 1).all()
 
 
 # ---- islands ------------------------------------------------------------------------------------------------
