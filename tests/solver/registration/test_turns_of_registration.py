@@ -219,7 +219,10 @@ def improved(monkeypatch):
         carrier = SimpleNamespace(place=lambda places: SimpleNamespace(positions=places))
         mesh = SimpleNamespace(landmarks=np.array([2, 5, 7]), triangles=F, domain=V)
         flow = Drawn(SimpleNamespace(domain=2 * V), np.array([True, False, True]), 6)
-        found = drain(coarse_start._improved(SimpleNamespace(carrier=carrier), mesh, flow, best))
+        found, fractions = told(coarse_start._improved(SimpleNamespace(carrier=carrier), mesh, flow, best))
+        # Each round begins with functional maps.
+        count = coarse_start.ROUNDS
+        assert fractions == pytest.approx([(k // 2 + 0.3 * (k % 2)) / count for k in range(len(fractions))])
         return found, calls
 
     return run
@@ -291,17 +294,20 @@ def test_large_surfaces_begin_on_a_coarse_mesh(count, coarse, sphere, monkeypatc
 def test_landmarks_that_are_not_there_at_the_end_are_drawn(landmarks, met, drawn, monkeypatch):
     calls = []
     monkeypatch.setattr(
-        coarse_start, "straightened", lambda a, t, moved, held: (calls.append(held.sum()), done(moved))[1]
+        coarse_start, "straightened", lambda a, t, moved, held: (calls.append(held.sum()), done(moved, 0.0, 1.0))[1]
     )
     monkeypatch.setattr(coarse_start, "deformation", lambda *_: "problem")
     monkeypatch.setattr(coarse_start, "without_folds", lambda problem, before, placed: placed)
     monkeypatch.setattr(coarse_start, "put_landmarks", lambda *_: ("put", np.full(landmarks, met)))
-    monkeypatch.setattr(coarse_start, "draw_landmarks", lambda *_: done(Drawn("drawn", np.ones(landmarks, bool), 5)))
+    monkeypatch.setattr(
+        coarse_start, "draw_landmarks", lambda *_: done(Drawn("drawn", np.ones(landmarks, bool), 5), 0.0, 1.0)
+    )
     carrier = SimpleNamespace(place=lambda places: SimpleNamespace(positions=places))
     pair = SimpleNamespace(landmarks=np.arange(landmarks), loop=None, triangles=F)
     case = SimpleNamespace(pair=pair, aligned=V, domain_carrier=lambda loop: carrier, flat_targets=lambda: "flat")
     given = np.ones(landmarks, bool)
-    found = drain(coarse_start._finished(case, 2 * V, given, 30))
+    found, fractions = told(coarse_start._finished(case, 2 * V, given, 30))
+    assert fractions == pytest.approx([0.8, 0.9] + [0.9, 1.0] * drawn)
     assert calls == [landmarks] and found.steps == (35 if drawn else 30) and found.met.all() == True  # noqa: E712
     assert (found.placed if landmarks else "put") == ("drawn" if drawn else "put")
     assert landmarks or np.array_equal(found.placed.positions, 2 * V)
