@@ -81,8 +81,8 @@ def bounded(monkeypatch):
                 missed=missed, apart=apart, spread=spread.tolist(), changes=changes, tried=sorted(tried)
             )
 
-        def anew(search, last, wanted, map_charts, early):
-            asked.append(("cut", last.name, wanted))
+        def anew(search, last, request, map_charts, early):
+            asked.append(("cut", last.name, request))
             new = rest.pop(0) if rest else None
             if ask_end == len([a for a in asked if a[0] == "cut"]):
                 early.is_asked = True
@@ -143,12 +143,14 @@ def test_rounds_go_on_until_the_bound_is_kept(bounded):
         and names(asked, "cut") == ["first", "second"]
         and names(asked, "shorter") == ["third"]
     )
-    wanted = [a[2] for a in asked if a[0] == "cut"]
+    requests = [a[2] for a in asked if a[0] == "cut"]
     # A share of the spread that there was is asked for, the more exactly the later.
     spread = [8.0 * 0.5**shear_bound.SPREAD_BY_SHEAR * 1.0]
-    assert wanted[0].spread == pytest.approx(spread) and wanted[1].spread == pytest.approx([spread[0] ** 2 / 8])
-    assert [w.changes["adding"] for w in wanted] == [False, True] and all(w.changes["share"] == [0.5] for w in wanted)
-    assert [w.tried for w in wanted] == [["first"], ["first", "second"]]
+    assert requests[0].spread == pytest.approx(spread) and requests[1].spread == pytest.approx([spread[0] ** 2 / 8])
+    assert [w.changes["adding"] for w in requests] == [False, True] and all(
+        w.changes["share"] == [0.5] for w in requests
+    )
+    assert [w.tried for w in requests] == [["first"], ["first", "second"]]
     margins = [r.shares_asked[0][2] for r in rounds[:2]]
     assert margins == pytest.approx([shear_bound.MARGIN, shear_bound.MARGIN**0.5])
     assert [r.shares_asked[0][1] for r in rounds[:2]] == [[np.inf], [0.25]]
