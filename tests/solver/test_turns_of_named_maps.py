@@ -20,7 +20,7 @@ from omt_uv.solver.progress import Progress
 from omt_uv.solver.remeshing.initial import initial_mesh
 
 V, F = meshes.grid(2, 2)
-RIM = np.array([0, 1, 2, 5, 8, 7, 6, 3])
+OUTLINE = np.array([0, 1, 2, 5, 8, 7, 6, 3])
 
 
 def done(value):
@@ -75,7 +75,7 @@ def test_a_conformal_map_to_a_rectangle_is_about_its_middle_and_stretched_where_
     monkeypatch.setattr(
         named_maps, "conformal_rectangle", lambda *_: done(SimpleNamespace(uv=uv, aspect=0.5, straightened=0))
     )
-    found, _ = told(named_maps.conformal_map(NamedProblem(V, F, np.ones(8), "rectangle", RIM[::2], aspect)))
+    found, _ = told(named_maps.conformal_map(NamedProblem(V, F, np.ones(8), "rectangle", OUTLINE[::2], aspect)))
     assert found.uv == pytest.approx((uv - [0.5, 0.25]) * [1, aspect / 0.5 if stretched else 1])
     assert len(found.warnings) == stretched and (not stretched or "aspect 0.5; it was stretched" in found.warnings[0])
 
@@ -107,7 +107,7 @@ def test_a_polar_map_puts_every_vertex_into_the_middle_of_its_cell(cornered, fol
     monkeypatch.setattr(named_maps, "count_folds", lambda *_: left.pop(0) if len(left) > 1 else (1 if folds else 0))
     monkeypatch.setattr(named_maps, "untangle", lambda uv, *_: (uv + 10, "told"))
     target = np.arange(1.0, 9.0)
-    problem = NamedProblem(V, F, target, "rectangle" if cornered else "disk", RIM[::2] if cornered else None)
+    problem = NamedProblem(V, F, target, "rectangle" if cornered else "disk", OUTLINE[::2] if cornered else None)
     found, fractions = told(named_maps.polar_map(problem, balance))
     sites, mass, domain = asked[0]
     want = [sum(target[k] / 3 for k in range(8) if v in F[k]) for v in range(9)]
