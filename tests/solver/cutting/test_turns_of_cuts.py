@@ -21,8 +21,11 @@ class Net:
 
     most, cut, tips = 50.0, "net", "tips"
 
-    def __init__(self, length):
-        self.length, self.asked = length, []
+    def __init__(self, length, comb):
+        self.length, self.comb, self.asked = length, comb, []
+
+    def is_comb(self, needed):
+        return self.comb and needed < 7
 
     def up_to(self, limit):
         self.asked.append(limit)
@@ -33,9 +36,12 @@ class Net:
 def best(monkeypatch):
     """The best cut of a part, and what was tried for it."""
 
-    def run(*, length=None, other=10.0, extremities=6, filled=False, searched=False, again=False, search=True):
+    def run(*, length=None, other=10.0, comb=False, boundaries=1, needed=5.0, extremities=6, **given):
+        filled, searched, again, search = (
+            given.get(n, n == "search") for n in ("filled", "searched", "again", "search")
+        )
         tried = []
-        made = None if length is None else Net(length)
+        made = None if length is None else Net(length, comb)
         monkeypatch.setattr(cuts, "net", lambda component: (tried.append("net"), made)[1])
 
         def plain(component, topology, k, extremities, outline):
@@ -48,10 +54,12 @@ def best(monkeypatch):
 
         monkeypatch.setattr(cuts, "cut_component", plain)
         monkeypatch.setattr(cuts._Cutter, "_search_component", searching)
+        monkeypatch.setattr(cuts, "_needed", lambda *_: needed)
         finder = SimpleNamespace(is_again=again) if search else None
+        topology = SimpleNamespace(boundaries=[boundaries])
         cutter = cuts._Cutter(None, None, None, None, extremities, finder, "outline")
         component = SimpleNamespace(length=np.array([0.6 * other, 99.0, 0.4 * other]))
-        found = drain(cutter._best_cut(component, None, 0, filled, searched))
+        found = drain(cutter._best_cut(component, topology, 0, filled, searched))
         return (found[0] if isinstance(found[0], str) else "cut"), tried, made
 
     return run
@@ -75,6 +83,26 @@ def test_what_is_searched_has_a_net_or_seams(best):
     assert best(length=1.0, searched=True, again=True)[:2] == ("seams", ["search"])
     assert best(length=1.0, searched=True, search=False)[0] == "net"
     assert best(searched=True, search=False)[1] == ["net", "cut 6 outline"]
+
+
+def test_combs_are_no_nets_of_what_has_a_boundary_and_is_searched(best):
+    assert best(length=50.0, searched=True, comb=True)[:2] == ("seams", ["net", "search"])
+    for given in ({"boundaries": 0}, {"needed": 8.0}, {"searched": False}):
+        assert best(**{"length": 50.0, "searched": True, "comb": True} | given)[0] == "net"
+
+
+@pytest.mark.parametrize("disk", [True, False])
+def test_what_has_to_be_cut_anyway_is_needed(disk, monkeypatch):
+    asked = []
+
+    def plain(component, topology, k, extremities):
+        asked.append(extremities)
+        return np.array([0, 2]), "tips"
+
+    monkeypatch.setattr(cuts, "cut_component", plain)
+    component = SimpleNamespace(length=np.array([1.0, 2.0, 4.0]))
+    assert cuts._needed(component, SimpleNamespace(is_disk=[disk]), 0) == (0.0 if disk else 5.0)
+    assert asked == ([] if disk else [0])
 
 
 def test_nets_are_for_what_is_cut_to_tips_and_not_filled(best):
