@@ -170,8 +170,9 @@ def test_caps_that_are_fanned_are_mapped_as_they_are_where_that_folds_them(metho
     if folded:
         flat[F[0, 0]] = -V[F[0, 0]]
 
-    def mapping(given, method, options):
+    def mapping(given, used, options):
         asked.append(given)
+        assert (used, options) == (method, {"balance": 0.25, "quality": "draft"})
         n = len(V) + (given == "fans")
         rows = np.concatenate([flat, np.ones((1, 3))])[:n]
         found = {"positions": rows, "conformal": rows, "sites": rows, "status": "", "iterations": 0, "residual": 0.0}
@@ -179,7 +180,7 @@ def test_caps_that_are_fanned_are_mapped_as_they_are_where_that_folds_them(metho
 
     monkeypatch.setattr(spheres, "with_polygon_fans", lambda given: "fans")
     monkeypatch.setattr(spheres, "_mapped", mapping)
-    steps = spheres.sphere_map(V, F, method=method)
+    steps = spheres.sphere_map(V, F, method=method, balance=0.25, quality="draft")
     try:
         while True:
             next(steps)
