@@ -173,3 +173,56 @@ def test_surfaces_are_turned_to_look_outwards():
     outwards = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     assert np.array_equal(body_map._outwards(points, outwards), outwards)
     assert np.array_equal(body_map._outwards(points, outwards[:, ::-1]), outwards)
+
+
+@pytest.mark.parametrize("slide", [True, False])
+@pytest.mark.parametrize(
+    ("errors", "rounds"),
+    # Until it is low enough, or has hardly fallen for three rounds; steps that are none cost a round.
+    [
+        ([0.5, 0.01], 1),
+        ([0.5, 0.4, 0.011, 0.01], 3),
+        ([0.5] * 9, 3),
+        ([0.5, None, 0.01], 2),
+        ([0.5, 0.499, 0.498, 0.3, 0.01], 4),
+    ],
+)
+def test_rounds_of_exact_volumes_go_on_while_they_help(errors, rounds, slide, monkeypatch):
+    from dataclasses import dataclass
+
+    from omt_uv.solver.volumes import tet_exact
+
+    asked, at = [], [0]
+
+    @dataclass(frozen=True)
+    class Both:
+        off: np.ndarray
+        points: np.ndarray
+        positions: np.ndarray
+
+    points = 2 * corner()[0].points
+
+    def both(error, k):
+        return Both(np.array([error, 0.0]), points / np.cbrt(8 / 6) + k, np.full((4, 3), float(k)))
+
+    def step(now, domain, damping, slide):
+        asked.append((damping, slide))
+        at[0] += 1
+        error = errors[min(at[0], len(errors) - 1)]
+        return (None, False) if error is None else (both(error, at[0]), at[0] % 2 == 1)
+
+    monkeypatch.setattr(tet_exact, "_both", lambda tets, points, positions: both(errors[0], 0))
+    monkeypatch.setattr(tet_exact, "_round", step)
+    domain = SimpleNamespace(boundary=np.array([0, 1, 2]))
+    found, fractions = told(
+        tet_exact.exact_volumes(points, np.array([[0, 1, 2, 3]]), np.zeros((4, 3)), domain, 0.01, slide)
+    )
+    assert found.rounds == rounds and fractions == pytest.approx([k / tet_exact.ROUNDS for k in range(rounds)])
+    damping = [0.01]
+    for k in range(1, rounds):
+        error = errors[min(k, len(errors) - 1)]
+        damping.append(damping[-1] * 10 if error is None else max(damping[-1] * (0.25 if k % 2 else 4), 1e-6))
+    assert [a[0] for a in asked] == pytest.approx(damping) and all(a[1] == slide for a in asked)
+    assert np.array_equal(found.points[:3], points[:3]) and (found.positions == rounds).all()
+    # What lies inside moves in the units of the body.
+    assert found.points[3] == pytest.approx(points[3] + (np.cbrt(8 / 6) * rounds if slide else 0))
