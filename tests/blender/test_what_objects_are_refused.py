@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import types
+
 import bpy
 
 import numpy as np
@@ -138,6 +140,8 @@ def test_an_image_of_no_pixels_or_another_number_of_channels_is_named(package):
     missing.source, missing.filepath = "FILE", "//nowhere.png"
     missing.reload()
     refused("ImageError", "'Gone' has no pixels", module.pixels_of, missing)
+    grey = types.SimpleNamespace(name="Grey", size=(4, 2), channels=1)
+    refused("ImageError", "'Grey' has 1 channels. Convert it to RGBA", module.pixels_of, grey)
 
 
 def test_what_an_operator_needs_is_told_and_nothing_is_done(package):

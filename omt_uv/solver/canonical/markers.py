@@ -49,7 +49,7 @@ class ChartMarkers:
         >>> ChartMarkers(centre=4, start=1).in_disk(square, np.arange(4)).round(3)[[4, 1], 0].tolist()
         [0.0, 1.0]
         """
-        w = as_complex(uv)
+        w = as_complex(uv).copy()
         if len(self.corners) == 3:
             w = _three_points(w, w[list(self.corners)])
         elif self.centre >= 0:
