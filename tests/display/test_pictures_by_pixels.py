@@ -279,3 +279,11 @@ def test_layouts_show_each_polygon_in_its_colour(kind):
     reading.faces = np.array([False, True])
     part = layouts.layout_picture([SimpleNamespace(reading=reading, rotation=np.eye(3))], kind, 40)
     np.testing.assert_allclose(part[int(0.75 * 40), 10], layouts.PAPER)
+
+
+@pytest.mark.parametrize(
+    ("reached", "end"), [(3.0, 3), (3.0 + 5e-7, 3), (3.0 + 5e-6, 4), (3.0 - 5e-7, 3), (0.1, 2), (99.0, 10)]
+)
+def test_what_stands_for_rounding_moves_no_end(reached, end):
+    octaves = np.concatenate([np.zeros(50), np.full(50, reached)])
+    assert histogram._reach(octaves, np.ones(100), 2) == end

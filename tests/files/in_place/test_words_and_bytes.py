@@ -480,3 +480,34 @@ def test_counts_of_fbx_are_those_of_its_arrays(long):
     for bad in (data[:-30], data[:40], b"x" + data[1:], data[:26]):
         with pytest.raises(fbx_nodes.FileError, match=r"too early|no binary FBX"):
             fbx_nodes.count(bad)
+
+
+def test_triangles_that_were_dropped_are_counted_over_all_meshes(monkeypatch):
+    asked = []
+    doc = {"meshes": [{"primitives": [{"n": 2}, {"n": 0}, {"n": 1}]}, {"primitives": [{"n": 1}]}]}
+    found = {"Mesh.10": (0, np.arange(9)), "Mesh.2": (1, np.arange(3) + 20)}
+
+    class Meshes:
+        def __init__(self, _glb):
+            pass
+
+        def find(self, mesh):
+            asked.append(mesh.name)
+            return found[mesh.name]
+
+    def check(corners, start, kept, count):
+        assert start.tolist() == list(range(0, len(corners) + 1, 3)) and kept.all() and count == 7
+        return len(corners) // 3 - 1 + 5
+
+    monkeypatch.setattr(glb, "_Meshes", Meshes)
+    monkeypatch.setattr(glb, "triangles", lambda _glb, primitive: np.arange(3 * primitive["n"]).reshape(-1, 3))
+    monkeypatch.setattr(glb, "check_found", check)
+    meshes = [SimpleNamespace(name=name, corner_vertex=np.zeros(7)) for name in ("Mesh.10", "Mesh.2")]
+    parts, dropped = glb._parts(SimpleNamespace(doc=doc), meshes)
+    # In the order of their names without Blender's numbers; empty primitives have no part.
+    assert sorted(asked) == ["Mesh.10", "Mesh.2"] and dropped == (2 + 5) + (0 + 5)
+    of = {id(p.primitive): p for p in parts}
+    first, _, third = doc["meshes"][0]["primitives"]
+    assert len(parts) == 3 and of[id(first)].found.tolist() == list(range(6))
+    assert of[id(third)].found.tolist() == [6, 7, 8] and of[id(third)].mesh is meshes[0]
+    assert of[id(doc["meshes"][1]["primitives"][0])].found.tolist() == [20, 21, 22]
