@@ -171,3 +171,51 @@ def test_changes_of_volume_are_relative_and_of_closed_parts_alone():
     assert len(shape_of(V, F[:0]).changes(V)) == 0
     flat = shape_of(V * [1, 1, 0], F)
     assert len(flat.changes(V)) == 0
+
+
+@pytest.mark.parametrize("mend", [True, False])
+@pytest.mark.parametrize("mended", [True, False])
+def test_only_what_was_taken_apart_and_its_faces_are_looked_at_again(mended, mend, monkeypatch):
+    """Volumes are given back once more by the vertices around what moved, and pairs that were left are told."""
+    V, F = meshes.grid(3, 3)
+    free = np.ones(16, bool)
+    free[1] = False
+    given = shapes.FlowShape(V, F, free)
+    calls = []
+
+    def restore(before, after, parts, movable):
+        calls.append(np.flatnonzero(movable).tolist())
+        return (after + 1 if len(calls) == 1 else after + 100), None
+
+    def apart(move, crossings, free, farthest, concerned):
+        calls.append((farthest, concerned))
+        at = move[1].copy()
+        if mended:
+            at[[0, 6]] += 5
+        return (at if mended else move[1]), np.array([[17, 16]])
+
+    def pairs(self, at, concerned):
+        calls.append(np.flatnonzero(concerned).tolist())
+        return "pairs"
+
+    monkeypatch.setattr(shapes, "restore_volumes", restore)
+    monkeypatch.setattr(shapes, "taken_apart", apart)
+    monkeypatch.setattr(shapes, "touched", lambda before, after, triangles: "touched")
+    monkeypatch.setattr(shapes, "farthest_mended", lambda points, triangles: "farthest")
+    monkeypatch.setattr(shapes.FlowShape, "_apart", pairs)
+    found = given.sound(2 * V, mend)
+    every = [k for k in range(16) if k != 1]
+    assert calls[0] == every
+    if not mend:
+        assert np.array_equal(found.positions, 2 * V + 1) and len(found.pairs) == 0 and not found.mended.any()
+        return
+    assert calls[1] == ("farthest", "touched")
+    if not mended:
+        assert (
+            np.array_equal(found.positions, 2 * V + 1) and not found.mended.any() and found.pairs.tolist() == [[17, 16]]
+        )
+        return
+    near = {int(v) for t in F if {0, 6} & set(t.tolist()) for v in t}
+    assert calls[2] == sorted(near - {1}) and np.flatnonzero(found.mended).tolist() == [0, 6]
+    assert calls[3] == sorted({k for k, t in enumerate(F.tolist()) if near & set(t)} | {16, 17})
+    assert found.pairs == "pairs" and found.positions[5] == pytest.approx(2 * V[5] + 101)
