@@ -121,10 +121,12 @@ def test_what_is_allowed_is_the_bound_over_what_there_is():
     assert one.share_allowed(0) == pytest.approx(0.95 * np.log(1.35) ** 2 / np.log(1.1) ** 2)
 
 
-@pytest.mark.parametrize("rehearsed, mean, slack", [(1.0, 1.1, True), (None, 1.1, False), (1.0, 1.34, False)])
-def test_slack_is_where_a_rehearsal_asked_for_more_than_the_map_needs(rehearsed, mean, slack):
+@pytest.mark.parametrize("rehearsed, mean, slack", [(1.0, 1.1, True), (None, 1.1, True), (1.0, 1.34, False)])
+def test_slack_is_where_a_search_asked_for_more_than_the_map_needs(rehearsed, mean, slack):
     memory = {"it": SimpleNamespace(polygons=np.array([0]), rehearsed=rehearsed)}
     assert round_of([1], [mean], memory=memory).has_slack(0) == slack
+    # What was not searched has none.
+    assert not round_of([1], [mean], memory={}).has_slack(0)
     other = {"it": SimpleNamespace(polygons=np.array([0, 1]), rehearsed=rehearsed)}
     assert not round_of([1, 1], [mean, 1.0], memory=other).has_slack(0)
 
