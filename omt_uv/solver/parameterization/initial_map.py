@@ -27,11 +27,11 @@ from ..maps.untangle import is_one_to_one, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
-from ..refinement.continuation_rules import QUALITIES, UNSQUEEZED, is_squeezed
+from ..refinement.continuation_rules import QUALITIES, SQUEEZED, UNSQUEEZED, is_squeezed
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
-from ..refinement.vertex_sweeps import smoothed
+from ..refinement.vertex_sweeps import smoothed_uv
 from ..transport.convex_domain import Disk, Domain, Rectangle
 
 if TYPE_CHECKING:
@@ -91,6 +91,8 @@ SMOOTH_WEIGHT_FAR = 500.0
 # The most energy at that weight of an evened map that is a start: a stage in which a squeezed one relaxes would leave
 # as much, were it all of areas.
 ROOM = SMOOTH_WEIGHT * UNSQUEEZED
+# The most shear energy, over the spread of the flat map, that it may have: of more some stays.
+MOST_SHEAR = 3.0
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,20 @@ class DiskMesh:
         except PrecisionError:
             return None
 
+    @cached_property
+    def spread(self) -> float:
+        """Mean square of the log scale of the flat disk; about as much shear energy is left where areas are exact."""
+        mass = np.bincount(self.triangles.ravel(), np.repeat(self.target / 3, 3), len(self.vertices))
+        return np.inf if self.flat is None else self.flat.spread(mass)
+
+    @cached_property
+    def bent(self) -> np.ndarray | None:
+        """The flat disk (n,2), bent until it does not cover itself; None where double precision has no such map."""
+        with suppress(PrecisionError):
+            if self.flat is not None:
+                return self.flat.bent_until(lambda uv: is_one_to_one(uv, self.triangles, self.loop))
+        return None
+
 
 @dataclass(frozen=True)
 class InitialChartMap:
@@ -179,27 +195,13 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
         flat = _evenly_flattened(disk, spread)
         if flat is None or is_one_to_one(flat, disk.triangles, disk.loop):
             return None if flat is None else InitialChartMap(flat)
-        bent = None if len(disk.vertices) <= EVENED_ABOVE else _bent(disk)
+        bent = None if len(disk.vertices) <= EVENED_ABOVE else disk.bent
         return InitialChartMap(disk.embedded if bent is None else bent)
-
-
-def _bent(disk: DiskMesh) -> np.ndarray | None:
-    """A disk (n,2) flattened and bent until it does not cover itself; None where double precision has no such map."""
-    with suppress(PrecisionError):
-        if disk.flat is not None:
-            return disk.flat.bent_until(lambda uv: is_one_to_one(uv, disk.triangles, disk.loop))
-    return None
-
-
-def _sprawls(disk: DiskMesh) -> bool:
-    """Whether no map of a disk is nearly an isometry: of others a start that is sheared keeps some of its shear."""
-    return _evenly_flattened(disk, LITTLE_SPREAD) is None
 
 
 def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
     """A disk flattened (n,2) with the boundary as it comes; None where that scales unevenly."""
-    mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
-    return disk.flat.uv if disk.flat is not None and disk.flat.spread(mass) < spread else None
+    return disk.flat.uv if disk.flat is not None and disk.spread < spread else None
 
 
 def coarse_initial_map(
@@ -266,7 +268,9 @@ def _coarse_initial_map(
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
         give_back_of(len(vertices))
         weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
-        uv = yield from part_of(_smoothed(disk, uv, weight, draft), *SMOOTHING)
+        sweeps, goal = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
+        smooth = smoothed_uv(vertices, triangles, disk.target, uv, weight, sweeps, goal)
+        uv = yield from part_of(smooth, *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
         start = None if far or draft else flat
         if start is not None and map_energy(start, vertices, triangles) < map_energy(uv, vertices, triangles):
@@ -301,18 +305,6 @@ def _draft_start(disk: DiskMesh, flat: np.ndarray, log: RunLog) -> InitialChartM
     return InitialChartMap(flat) if even is None else even
 
 
-def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, draft: bool) -> Steps[np.ndarray]:
-    """A map uv (n,2) that came from a coarser mesh, its vertices moved within their stars."""
-    sweeps, goal = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
-    faces, w = elements(disk.vertices, disk.triangles, disk.target), uv @ [1, 1j]
-    w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-    steps = smoothed(faces, w, area_weight, sweeps, goal=goal)
-    # They take the memory of six maps, and sweeps have their own.
-    del faces
-    w = yield from steps
-    return np.column_stack([w.real, w.imag])
-
-
 def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
     """A free disk of a middle size, flattened as it comes or mapped by evened weights; None where neither has room."""
     n = len(disk.vertices)
@@ -325,23 +317,31 @@ def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
         if flat is not None:
             return InitialChartMap(flat)
         try:
-            given = (faces, SMOOTH_WEIGHT, ROOM, disk.order, lambda: _sprawls(disk))
+            # Others have maps that are nearly isometries.
+            sprawls = disk.spread >= LITTLE_SPREAD
+            given = (faces, SMOOTH_WEIGHT, SQUEEZED if sprawls else ROOM, disk.order, lambda: sprawls)
             evened = evened_tutte(disk.vertices, disk.loop, disk.embedded, *given)
         except PrecisionError:
             return None
         if evened is not None and n > COARSE_ABOVE:
             flat = _roomy_flat(disk, faces)
+        if flat is None and evened is not None and _energy(faces, evened, 0.0) > MOST_SHEAR * disk.spread:
+            return None
         return None if evened is None else InitialChartMap(evened if flat is None else flat)
 
 
 def _roomy_flat(disk: DiskMesh, faces: Elements) -> np.ndarray | None:
     """A disk flattened (n,2) that scales evenly, is one to one, and not squeezed; None where that is not so."""
     flat = _evenly_flattened(disk, LITTLE_SPREAD)
-    if flat is None or not (is_one_to_one(flat, disk.triangles, disk.loop) or (flat := _bent(disk)) is not None):
+    if flat is None or not (is_one_to_one(flat, disk.triangles, disk.loop) or (flat := disk.bent) is not None):
         return None
-    w = flat @ [1, 1j]
-    w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-    return None if is_squeezed(energy(faces, w, SMOOTH_WEIGHT), SMOOTH_WEIGHT) else flat
+    return None if is_squeezed(_energy(faces, flat, SMOOTH_WEIGHT), SMOOTH_WEIGHT) else flat
+
+
+def _energy(faces: Elements, uv: np.ndarray, area_weight: float) -> float:
+    """The energy of a map uv (n,2), as large as its targets."""
+    w = uv @ [1, 1j]
+    return energy(faces, w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum()), area_weight)
 
 
 def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
@@ -351,7 +351,7 @@ def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
         return None
     faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
     with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
-        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, ROOM, lambda: _sprawls(disk))
+        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, SQUEEZED, lambda: True)
         return None if evened is None else InitialChartMap(evened)
     return None
 

@@ -110,7 +110,7 @@ KEPT_PROMISE = 0.7
 # One that gains this share of it to that has a Hessian that is true.
 TRUE_PROMISE = (0.9, 1.2)
 POOR_PROMISE = 0.3
-# Of a step that is poor because a fold is near: the share of it that was taken.
+# Of a step that is poor because a fold is near, or the energy bends before its end: the share of it that was taken.
 POOR_SHARE = 0.5
 # The energy is a mean over the surface: below this it is rounding.
 NO_ENERGY = 1e-12
@@ -236,7 +236,7 @@ def next_pressure(pressure: Number, share: Number, gain: Number, decrement: Numb
     share: of the step that was taken; gain: by how much the energy fell; decrement: by how much it was to fall
     """
     full = has_kept(share, gain, decrement)
-    poor = (share < POOR_SHARE) | (gain < POOR_PROMISE * decrement)
+    poor = (share <= POOR_SHARE) | (gain < POOR_PROMISE * decrement)
     more = np.minimum(1.0, np.maximum(3 * pressure, 3 * LEAST_PRESSURE))
     true = (gain > TRUE_PROMISE[0] * decrement) & (gain < TRUE_PROMISE[1] * decrement)
     less = np.where(pressure > LEAST_PRESSURE, pressure / np.where(true, PRESSURE_DROPS, PRESSURE_FALLS), 0.0)

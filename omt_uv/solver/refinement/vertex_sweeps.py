@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..maps.contacts import crossings_on_the_way, loop_edges
-from ..maps.energy import Elements, area_error, energies, squared
+from ..maps.energy import Elements, area_error, elements, energies, squared
 from ..mesh.topology import halfedges, order_of_numbers, runs, twins
 from ..progress import Progress, Steps
 
@@ -57,6 +57,26 @@ def smoothed(
         if aim is not None and area_error(aim, w) <= goal:
             break
     return w
+
+
+def smoothed_uv(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    target: np.ndarray,
+    uv: np.ndarray,
+    area_weight: float,
+    sweeps: int,
+    goal: float = 0.0,
+) -> Steps[np.ndarray]:
+    """A map uv (n,2) of a mesh (n,3), (m,3), as large as its target areas (m,), after `smoothed` with its boundary as
+    it is, (n,2)."""
+    faces, w = elements(vertices, triangles, target), uv @ [1, 1j]
+    w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
+    steps = smoothed(faces, w, area_weight, sweeps, goal=goal)
+    # They take the memory of six maps, and sweeps have their own.
+    del faces
+    w = yield from steps
+    return np.column_stack([w.real, w.imag])
 
 
 def _sweep(sets: list, w: np.ndarray, area_weight: float, loop=None) -> None:
