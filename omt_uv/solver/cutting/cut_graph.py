@@ -7,12 +7,14 @@ three cuts meet where that saves length.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
 from ..mesh.topology import graph_components, halfedges
-from .component import CutComponent, edge_graph
+from .component import CutComponent
 
 # Times that all stretches of a cut are tried again.
 SWEEPS = 3
@@ -158,11 +160,7 @@ def cut_classes(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     corner = np.flatnonzero(on_cut[flat])
     place = np.empty(len(flat), dtype=np.int64)
     place[corner] = np.arange(len(corner))
-    f, s = component.pair[~cut & on_cut[component.ends].any(axis=1)].T
-    next_f, next_s = (h + 1 - 3 * (h % 3 == 2) for h in (f, s))
-    same = flat[f] == flat[s]
-    rows = np.concatenate([f, next_f])
-    columns = np.concatenate([np.where(same, s, next_s), np.where(same, next_s, s)])
+    rows, columns = _joined_corners(flat, *component.pair[~cut & on_cut[component.ends].any(axis=1)].T)
     joined = on_cut[flat[rows]]
     count, part = graph_components(place[rows[joined]], place[columns[joined]], len(corner))
     found = flat.astype(np.int64)
@@ -172,6 +170,19 @@ def cut_classes(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     is_first = np.zeros(len(flat) + 1, dtype=bool)
     is_first[first] = True
     return (np.cumsum(is_first)[first] - 1)[found].reshape(-1, 3)
+
+
+def _next_corner(corner: np.ndarray) -> np.ndarray:
+    """The corner (k,) after each of these in its triangle, where the halfedge of the same number ends."""
+    return corner + 1 - 3 * (corner % 3 == 2)
+
+
+def _joined_corners(flat: np.ndarray, f: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of corners, (2k,) each, of the vertices flat (c,), that two halfedges f, s (k,) of an edge each join."""
+    next_f, next_s = _next_corner(f), _next_corner(s)
+    same = flat[f] == flat[s]
+    rows = np.concatenate([f, next_f])
+    return rows, np.concatenate([np.where(same, s, next_s), np.where(same, next_s, s)])
 
 
 def cut_boundary(component: CutComponent, cut: np.ndarray) -> np.ndarray:
@@ -196,31 +207,100 @@ def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray,
 
     None if there are not two, or if it is longer than `longest`: what is farther away is not looked at.
     """
-    classes = cut_classes(component, cut)
-    n = int(classes.max()) + 1
-    tail, head = halfedges(classes)
-    boundary = cut_boundary(component, cut)
-    on_boundary, is_tip = np.zeros(n, dtype=bool), np.zeros(component.vertex_count, dtype=bool)
-    on_boundary[tail[boundary]] = on_boundary[head[boundary]] = True
-    # A tip that the rest does not touch is a boundary of one point.
-    is_tip[tips] = True
-    on_boundary[classes[is_tip[component.triangles]]] = True
-    at = np.flatnonzero(on_boundary)
-    place = np.cumsum(on_boundary) - 1
-    count, label = graph_components(place[tail[boundary]], place[head[boundary]], len(at))
-    if count != 2:
+    rim = _rim(component, cut, tips)
+    if rim is None:
         return None
-    one, other = at[label == 0], at[label == 1]
-    inner = np.flatnonzero(~cut)
-    ends = np.stack([tail[component.pair[inner, 0]], head[component.pair[inner, 0]]], axis=1)
-    distance, before, _ = dijkstra(
-        edge_graph(component, inner, ends, n), indices=one, min_only=True, return_predecessors=True, limit=longest
+    apart = (rim.side >= 0).all(axis=1) & (rim.side[:, 0] != rim.side[:, 1])
+    # From the shorter one less is looked at.
+    begun, ended = sorted((_spokes(component, rim, side) for side in (0, 1)), key=lambda spokes: len(spokes[0]))
+    found = _between(component, rim.on, begun, ended, longest)
+    best = longest if found is None else found[1]
+    lone = rim.edges[apart]
+    if len(lone) and component.cost[lone].min() <= best:
+        return lone[[component.cost[lone].argmin()]]
+    return None if found is None else found[0]
+
+
+class _Rim(NamedTuple):
+    """The boundaries of a cut component.
+
+    on (n,) bool : its vertices upon them, before they were cut; edges (k,) : others than cut ones that have an end
+    there; side (k,2) : the boundary, 0 or 1, at which an end of these is, -1 for none
+    """
+
+    on: np.ndarray
+    edges: np.ndarray
+    side: np.ndarray
+
+
+def _rim(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> _Rim | None:
+    """The two boundaries of the component cut open along the cut (e,) bool; None where there are not two.
+
+    A tip (t,) that the cut does not touch is a boundary of one point.
+    """
+    flat = component.triangles.ravel()
+    border = cut_boundary(component, cut)
+    on = np.zeros(component.vertex_count, dtype=bool)
+    on[flat[border]] = on[flat[_next_corner(border)]] = on[tips] = True
+    # Only what is on a boundary comes apart: the corners of all other vertices stay together.
+    corner = np.flatnonzero(on[flat])
+    place = np.zeros(len(flat), dtype=np.int64)
+    place[corner] = np.arange(len(corner))
+    edges = np.flatnonzero(~cut & (on[component.ends[:, 0]] | on[component.ends[:, 1]]))
+    f, s = component.pair[edges].T
+    rows, columns = _joined_corners(flat, f, s)
+    joined = on[flat[rows]]
+    count, copy = graph_components(place[rows[joined]], place[columns[joined]], len(corner))
+    sides, label = graph_components(copy[place[border]], copy[place[_next_corner(border)]], count)
+    if sides != 2:
+        return None
+    ends = np.stack([f, _next_corner(f)], axis=1)
+    return _Rim(on, edges, np.where(on[flat[ends]], label[copy[place[ends]]], -1))
+
+
+def _spokes(component: CutComponent, rim: _Rim, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (k,) from one boundary to the inside, the cheapest for every vertex there, and these vertices (k,)."""
+    row, at = np.nonzero((rim.side == side) & (rim.side[:, ::-1] < 0))
+    edge = rim.edges[row]
+    # The halfedges of an edge begin at its first end.
+    inside = component.ends[edge, 1 - at]
+    order = np.lexsort((component.cost[edge], inside))
+    vertex, first = np.unique(inside[order], return_index=True)
+    edge = edge[order[first]]
+    finite = np.isfinite(component.cost[edge])
+    return edge[finite], vertex[finite]
+
+
+def _between(
+    component: CutComponent,
+    closed: np.ndarray,
+    begun: tuple[np.ndarray, np.ndarray],
+    ended: tuple[np.ndarray, np.ndarray],
+    longest: float,
+) -> tuple[np.ndarray, float] | None:
+    """Edges (k,) of the shortest path that begins and ends with one of these edges each, from and to these vertices,
+    and through none that is closed (n,) bool, and its cost; None where it costs more than `longest`."""
+    n, graph = component.vertex_count, component.graph
+    if not len(begun[0]) or not len(ended[0]):
+        return None
+    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(graph.indptr))
+    inner = np.where(closed[row] | closed[graph.indices], np.inf, graph.data)
+    # One more vertex begins all paths.
+    data = np.concatenate([inner, component.cost[begun[0]]])
+    indices = np.concatenate([graph.indices, begun[1].astype(np.int32)])
+    indptr = np.append(graph.indptr, np.int32(len(data)))
+    distance, before = dijkstra(
+        csr_matrix((data, indices, indptr), shape=(n + 1, n + 1)), indices=n, return_predecessors=True, limit=longest
     )
-    if not np.isfinite(distance[other]).any():
+    total = distance[ended[1]] + component.cost[ended[0]]
+    last = int(total.argmin())
+    if not total[last] <= longest:
         return None
-    on_path = _ancestors(before, other[[np.argmin(distance[other])]])
-    on_path = on_path[before[on_path] >= 0]
-    return inner[_edges_between(ends, on_path, before[on_path].astype(np.int64), n)]
+    on_path = _ancestors(np.where(before[:n] < n, before[:n], -1), ended[1][[last]])
+    first = on_path[before[on_path] == n]
+    on_path = on_path[before[on_path] < n]
+    path = _edges_between(component.ends, on_path, before[on_path].astype(np.int64), n)
+    return np.concatenate([begun[0][np.searchsorted(begun[1], first)], path, ended[0][[last]]]), float(total[last])
 
 
 def _edges_between(ends: np.ndarray, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray:
