@@ -19,10 +19,9 @@ from .energy import Elements, energies_of, squared
 
 # Rounds at most in which weights are evened, and the share of its energy that one has to win for another one: each
 # takes a third of the time of a Newton step.
-ROUNDS = 6
+ROUNDS = 12
 WORTHWHILE = 0.3
 # The same where a transport, or the map of a coarser mesh, would be the start otherwise, which take longer.
-MORE_ROUNDS = 12
 WELCOME = 0.1
 
 # Sides that are shorter than this share of the mean get so much of a convex boundary: faces between vertices that
@@ -100,7 +99,7 @@ def evened_tutte(
     rows = _weights(positions, triangles)[inner]
     inside, outside = rows[:, inner], rows[:, loop]
     best, least, uv = uv, np.inf, uv.copy()
-    for k in range(MORE_ROUNDS):
+    for k in range(ROUNDS):
         a, b = faces.derivatives(uv @ [1, 1j])
         scale = np.sqrt((faces.area @ faces.ratio) / float(faces.area @ faces.sums(np.abs(squared(a) - squared(b)))))
         a, b = scale * a, scale * b
@@ -124,14 +123,9 @@ def evened_tutte(
 def _goes_on(k: int, value: float, before: float, most: float, patient: Callable[[], bool]) -> bool:
     """Whether weights are evened once more after k rounds that left the energy `value`, which one less had `before`."""
     won = value / before
-
-    def comes_down(rounds: int) -> bool:
-        # Lengths are evened by themselves once: only what comes after foretells what more will win.
-        return k < rounds - 1 and (k < 2 or value * won ** (rounds - 1 - k) <= most)
-
-    if won < 1 - WORTHWHILE and comes_down(ROUNDS):
-        return True
-    return value > most and won < 1 - WELCOME and comes_down(MORE_ROUNDS) and patient()
+    # Lengths are evened by themselves once: only what comes after foretells what more will win.
+    comes_down = k < ROUNDS - 1 and (k < 2 or value * won ** (ROUNDS - 1 - k) <= most)
+    return comes_down and (won < 1 - WORTHWHILE or (value > most and won < 1 - WELCOME and patient()))
 
 
 def _weighted(inside: csr_matrix, outside: csr_matrix, boundary: np.ndarray) -> np.ndarray:

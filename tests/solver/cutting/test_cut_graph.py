@@ -3,10 +3,13 @@
 import meshes
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 from short_cuts import component_of
 
+from omt_uv.solver.cutting import cut_graph
 from omt_uv.solver.cutting.cut_graph import cut_boundary, cut_classes, greedy_arcs, path_to, shorten, stretches
-from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.mesh.topology import boundary_loops, halfedges
 
 
 def euler(triangles):
@@ -93,3 +96,40 @@ def test_a_path_in_a_grid_is_as_long_as_its_steps():
     degree = np.bincount(component.ends[path].ravel())
     assert (degree == 1).sum() == 2 and degree.max() == 2
     assert 6 <= component.length[path].sum() <= 4 + 2 * np.sqrt(2) + 1e-12
+
+
+def bridge_of_the_cut_mesh(component, cut, tips):
+    """The cost of the shortest path between two boundaries, of which a tip may be one, on the mesh cut open."""
+    classes = cut_classes(component, cut)
+    loops = boundary_loops(classes)
+    lone = np.unique(classes[np.isin(component.triangles, tips)])
+    loops += [np.array([v]) for v in lone if not any(v in loop for loop in loops)]
+    if len(loops) != 2:
+        return None
+    inner = np.flatnonzero(~cut)
+    tail, head = (ends[component.pair[inner, 0]] for ends in halfedges(classes))
+    n = int(classes.max()) + 1
+    graph = csr_matrix((component.cost[inner], (tail, head)), shape=(n, n))
+    return dijkstra(graph, directed=False, indices=loops[0], min_only=True)[loops[1]].min()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("mesh", [meshes.torus, meshes.annulus, lambda: meshes.icosphere(3)])
+def test_bridges_are_the_shortest_paths_of_the_cut_mesh(mesh, seed):
+    component = component_of(*mesh())
+    tips = np.random.default_rng(seed).choice(component.vertex_count, 2, replace=False)
+    if len(component.boundary) and seed % 2:
+        tips = tips[:0]
+    cut = greedy_arcs(component, tips)
+    checked = 0
+    for stretch in stretches(component, cut, tips):
+        rest = cut.copy()
+        rest[stretch] = False
+        expected = bridge_of_the_cut_mesh(component, rest, tips)
+        path = cut_graph._shortest_bridge(component, rest, tips, 100.0)
+        assert (path is None) == (expected is None)
+        if path is not None:
+            checked += 1
+            assert component.cost[path].sum() == pytest.approx(expected) and len(np.unique(path)) == len(path)
+            assert cut_graph._shortest_bridge(component, rest, tips, 0.9 * expected) is None
+    assert checked

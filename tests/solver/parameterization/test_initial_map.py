@@ -90,6 +90,14 @@ def test_there_is_no_start_with_room_where_it_would_be_squeezed_or_another_one_i
     assert roomy_initial_map(magnified, RunLog()) is None
 
 
+def test_a_start_that_is_sheared_by_more_than_is_foretold_is_none(monkeypatch):
+    disk = disk_of(*subdivided(*meshes.head(50)))
+    start = roomy_initial_map(disk, RunLog())
+    assert start is not None and not np.array_equal(start.uv, disk.flat.uv)
+    monkeypatch.setattr(initial_maps, "MOST_SHEAR", 0.0)
+    assert roomy_initial_map(disk, RunLog()) is None
+
+
 def test_centroids_of_the_cells_have_the_mass_of_the_disk():
     V, F = meshes.bumpy(8, 8)
     disk = disk_of(V, F)

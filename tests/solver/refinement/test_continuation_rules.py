@@ -43,6 +43,11 @@ def test_pressure_stays_a_share_and_follows_the_promise():
     assert (after[SHARE == 0] == 1).all()
 
 
+def test_a_step_that_the_line_search_has_halved_asks_for_a_stiffer_hessian():
+    assert rules.next_pressure(0.09, 0.5, 0.5, 1.0) == pytest.approx(0.27)
+    assert rules.next_pressure(0.09, 0.6, 0.5, 1.0) == 0.09
+
+
 def test_a_stage_ends_by_the_true_hessian_or_at_its_goal():
     verdict = rules.judge_step(SHARE, PRESSURE, DECREMENT, np.zeros(300, bool), 0.3)
     assert not (verdict.converged & verdict.sharpen).any()
