@@ -268,8 +268,8 @@ def _coarse_initial_map(
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
         give_back_of(len(vertices))
         weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
-        sweeps, goal = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
-        smooth = smoothed_uv(vertices, triangles, disk.target, uv, weight, sweeps, goal)
+        sweeps, enough = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
+        smooth = smoothed_uv(vertices, triangles, disk.target, uv, weight, sweeps, enough)
         uv = yield from part_of(smooth, *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
         start = None if far or draft else flat
