@@ -207,21 +207,21 @@ def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray,
 
     None if there are not two, or if it is longer than `longest`: what is farther away is not looked at.
     """
-    rim = _rim(component, cut, tips)
-    if rim is None:
+    two = _two_boundaries(component, cut, tips)
+    if two is None:
         return None
-    apart = (rim.side >= 0).all(axis=1) & (rim.side[:, 0] != rim.side[:, 1])
+    apart = (two.side >= 0).all(axis=1) & (two.side[:, 0] != two.side[:, 1])
     # From the shorter one less is looked at.
-    begun, ended = sorted((_spokes(component, rim, side) for side in (0, 1)), key=lambda spokes: len(spokes[0]))
-    found = _between(component, rim.on, begun, ended, longest)
+    begun, ended = sorted((_spokes(component, two, side) for side in (0, 1)), key=lambda spokes: len(spokes[0]))
+    found = _between(component, two.on, begun, ended, longest)
     best = longest if found is None else found[1]
-    lone = rim.edges[apart]
+    lone = two.edges[apart]
     if len(lone) and component.cost[lone].min() <= best:
         return lone[[component.cost[lone].argmin()]]
     return None if found is None else found[0]
 
 
-class _Rim(NamedTuple):
+class _TwoBoundaries(NamedTuple):
     """The boundaries of a cut component.
 
     on (n,) bool : its vertices upon them, before they were cut; edges (k,) : others than cut ones that have an end
@@ -233,7 +233,7 @@ class _Rim(NamedTuple):
     side: np.ndarray
 
 
-def _rim(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> _Rim | None:
+def _two_boundaries(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> _TwoBoundaries | None:
     """The two boundaries of the component cut open along the cut (e,) bool; None where there are not two.
 
     A tip (t,) that the cut does not touch is a boundary of one point.
@@ -255,13 +255,13 @@ def _rim(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> _Rim | N
     if sides != 2:
         return None
     ends = np.stack([f, _next_corner(f)], axis=1)
-    return _Rim(on, edges, np.where(on[flat[ends]], label[copy[place[ends]]], -1))
+    return _TwoBoundaries(on, edges, np.where(on[flat[ends]], label[copy[place[ends]]], -1))
 
 
-def _spokes(component: CutComponent, rim: _Rim, side: int) -> tuple[np.ndarray, np.ndarray]:
+def _spokes(component: CutComponent, two: _TwoBoundaries, side: int) -> tuple[np.ndarray, np.ndarray]:
     """Edges (k,) from one boundary to the inside, the cheapest for every vertex there, and these vertices (k,)."""
-    row, at = np.nonzero((rim.side == side) & (rim.side[:, ::-1] < 0))
-    edge = rim.edges[row]
+    row, at = np.nonzero((two.side == side) & (two.side[:, ::-1] < 0))
+    edge = two.edges[row]
     # The halfedges of an edge begin at its first end.
     inside = component.ends[edge, 1 - at]
     order = np.lexsort((component.cost[edge], inside))
