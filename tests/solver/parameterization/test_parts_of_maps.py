@@ -29,6 +29,7 @@ from omt_uv.solver.parameterization.chart_map import FOLDED, ChartMap
 from omt_uv.solver.parameterization.options import MapOptions, ShearBound, UnwrapOptions
 from omt_uv.solver.progress import EarlyEnd, RunLog, drain
 from omt_uv.solver.refinement import batch_refine
+from omt_uv.solver.refinement.vertex_sweeps import smoothed_uv
 
 
 def chart_of(V, F, faces=None, ids=None):
@@ -421,7 +422,7 @@ def test_a_flat_start_is_bent_in_large_charts_and_a_mean_value_map_in_small(spre
     monkeypatch.setattr(initial_map, "EVENED_ABOVE", 10 if large else 1500)
     monkeypatch.setattr(initial_map, "_evenly_flattened", lambda *_: flat if spread else None)
     monkeypatch.setattr(initial_map, "is_one_to_one", lambda *_: one)
-    monkeypatch.setattr(initial_map, "_bent", lambda _: None if large == "unbent" else bent)
+    disk.__dict__["bent"] = None if large == "unbent" else bent
     start = initial_map.flat_initial_map(disk, RunLog())
     expected = {None: None, "flat": flat, "bent": bent, "embedded": disk.embedded}[found]
     assert start is None if expected is None else start.uv is expected
@@ -433,14 +434,14 @@ def test_a_disk_is_flattened_evenly_below_a_spread_by_the_mass_asked_for():
     fake = SimpleNamespace(uv="uv", spread=lambda mass: given.append(mass) or 0.3)
     disk.__dict__["flat"] = fake
     assert initial_map._evenly_flattened(disk, 0.31) == "uv" and initial_map._evenly_flattened(disk, 0.3) is None
+    assert disk.spread == 0.3 and len(given) == 1
     expected = [
         sum(disk.target[t] / 3 for t in range(len(disk.triangles)) if v in disk.triangles[t]) for v in range(169)
     ]
     np.testing.assert_allclose(given[0], expected)
-    assert initial_map._sprawls(disk) is False
+    disk = disk_mesh()
     disk.__dict__["flat"] = None
-    assert initial_map._evenly_flattened(disk, 9) is None and initial_map._sprawls(disk) is True
-    assert initial_map._bent(disk) is None
+    assert initial_map._evenly_flattened(disk, 9) is None and disk.spread == np.inf and disk.bent is None
 
 
 @pytest.mark.parametrize(
@@ -474,6 +475,9 @@ def test_an_even_start_is_for_what_a_mean_value_map_leaves_hopeless(hopeless, ev
         ({"above": 100}, "flat"),
         ({"above": 100, "flat": False}, "evened"),
         ({"above": 100, "evened": None}, None),
+        ({"flat": False, "energy": 0.59}, "evened"),
+        ({"flat": False, "energy": 0.61}, None),
+        ({"above": 100, "energy": 0.61}, "flat"),
     ],
 )
 def test_a_roomy_start_is_flat_or_evened_in_meshes_of_a_middle_size(changed, found, monkeypatch):
@@ -484,6 +488,9 @@ def test_a_roomy_start_is_flat_or_evened_in_meshes_of_a_middle_size(changed, fou
     monkeypatch.setattr(initial_map, "COARSE_ABOVE", changed.get("above", 500))
     monkeypatch.setattr(initial_map, "_roomy_flat", lambda *_: "flat" if changed.get("flat", True) else None)
     monkeypatch.setattr(initial_map, "evened_tutte", lambda *_: changed.get("evened", "evened"))
+    # Of more than three times the spread of the flat map some shear would stay.
+    disk.__dict__["spread"] = 0.2
+    monkeypatch.setattr(initial_map, "_energy", lambda *_: changed.get("energy", 0.0))
     start = initial_map.roomy_initial_map(disk, RunLog())
     assert (None if start is None else start.uv) == found
 
@@ -514,7 +521,11 @@ def test_drafts_and_direct_starts_are_flat_only_where_the_boundary_is_free(bound
 def test_what_comes_back_is_smoothed_at_the_scale_of_its_target():
     disk = disk_mesh()
     uv = flat_uv(disk) * 7
-    drafts = [drain(initial_map._smoothed(disk, uv, 200.0, draft)) for draft in (True, False)]
+    given = disk.vertices, disk.triangles, disk.target, uv, 200.0
+    drafts = [
+        drain(smoothed_uv(*given, initial_map.DRAFT_SWEEPS, 0.05)),
+        drain(smoothed_uv(*given, initial_map.SWEEPS)),
+    ]
     for found in drafts:
         area = signed_areas(found, disk.triangles)
         assert (area > 0).all() and area.sum() == pytest.approx(disk.target.sum(), rel=0.02)
