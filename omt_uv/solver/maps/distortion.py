@@ -103,7 +103,7 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -
     Raises
     ------
     EmptyMeshError : no faces
-    NonFiniteError : a position or UV is NaN or infinite
+    NonFiniteError : a position or UV is NaN or infinite, or the area of all faces is beyond the greatest number
     ZeroAreaFaceError : no face has an area in 3D
     """
     V, F, uv, polygons = _checked(V, F, uv, polygons)
@@ -193,6 +193,11 @@ def _surface_area(V, F, polygons):
     counted = _counted(polygons)
     area = polygon_areas(V, F, counted)
     whole = area if counted is None else np.bincount(counted, area)
+    if not np.isfinite(whole.sum()):
+        every = np.ones(len(F), bool)
+        raise NonFiniteError(
+            "The area of the faces is no finite number", "Scale them down", "face", _names(polygons, every)
+        )
     real = whole > NEGLIGIBLE_AREA * whole.sum()
     if not real.any():
         raise ZeroAreaFaceError("No face has an area", "", "face", _names(polygons, np.ones(len(F), bool)))

@@ -344,3 +344,13 @@ def test_charts_are_told_alike_whether_corners_of_a_vertex_have_one_place_to_the
     assert uv_charts(F, uv)[0] == 1 and uv_charts(F, apart)[0] > 1
     split = np.concatenate([F, F + len(V)])
     assert uv_charts(split, np.concatenate([uv, uv]))[0] == 2
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_areas_beyond_the_greatest_number_are_told_as_such():
+    V, F = meshes.grid(3, 3)
+    for figures in (distortion, face_distortion):
+        with pytest.raises(NonFiniteError, match="area") as caught:
+            figures(1e200 * V, F, V[F][..., :2])
+        assert caught.value.elements.tolist() == list(range(len(F)))
+        figures(1e60 * V, F, V[F][..., :2])
