@@ -11,7 +11,7 @@ import pytest
 
 from omt_uv.files import fbx_nodes
 from omt_uv.files.formats import headers, off
-from omt_uv.files.in_place import glb, glb_data, imported, obj, obj_text, ply, ply_rows
+from omt_uv.files.in_place import glb, glb_data, gltf, imported, obj, obj_text, ply, ply_rows
 from omt_uv.files.in_place.imported import Imported, InPlaceError
 
 
@@ -511,3 +511,13 @@ def test_triangles_that_were_dropped_are_counted_over_all_meshes(monkeypatch):
     assert len(parts) == 3 and of[id(first)].found.tolist() == list(range(6))
     assert of[id(third)].found.tolist() == [6, 7, 8] and of[id(third)].mesh is meshes[0]
     assert of[id(doc["meshes"][1]["primitives"][0])].found.tolist() == [20, 21, 22]
+
+
+def test_a_buffer_in_the_text_stays_as_it_is_wherever_the_file_goes(tmp_path):
+    inside, beside = {"uri": "data:application/octet-stream;base64,AAAA", "byteLength": 3}, {"uri": "a%20b.bin"}
+    assert gltf._placed(inside, b"new", tmp_path) is inside and gltf._placed(beside, b"new", None) is beside
+    # A file that is there, or begins as it does, is the buffer; another one is not.
+    assert gltf._placed(beside, b"raw", tmp_path)["uri"].startswith("data:")
+    for there, same in ((b"raw", True), (b"raw and more", True), (b"ra", False), (b"row", False)):
+        (tmp_path / "a b.bin").write_bytes(there)
+        assert (gltf._placed(beside, b"raw", tmp_path) is beside) == same
