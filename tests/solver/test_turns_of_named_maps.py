@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import told, worked
 
 from omt_uv.pipelines.measuring import diagrams
 from omt_uv.solver.canonical import named_maps
@@ -16,28 +17,10 @@ from omt_uv.solver.canonical.named_maps import NamedMap, NamedProblem
 from omt_uv.solver.errors import BoundaryError, PrecisionError
 from omt_uv.solver.globe import pole_vertices
 from omt_uv.solver.mesh.spherical_geometry import normalized
-from omt_uv.solver.progress import Progress
 from omt_uv.solver.remeshing.initial import initial_mesh
 
 V, F = meshes.grid(2, 2)
 OUTLINE = np.array([0, 1, 2, 5, 8, 7, 6, 3])
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    if isinstance(value, Exception):
-        raise value
-    return value
-
-
-def told(steps):
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
 
 
 # ---- maps by name -------------------------------------------------------------------------------------------
@@ -60,7 +43,7 @@ def test_a_free_conformal_map_tells_of_faces_that_it_turns_over(folds, turned, m
 
 
 def test_a_conformal_map_to_the_disk_is_turned_within_it(turned, monkeypatch):
-    monkeypatch.setattr(named_maps, "conformal_disk", lambda *_: done(SimpleNamespace(uv=V[:, :2], straightened=4)))
+    monkeypatch.setattr(named_maps, "conformal_disk", lambda *_: worked(SimpleNamespace(uv=V[:, :2], straightened=4)))
     found, _ = told(named_maps.conformal_map(NamedProblem(V, F, np.ones(8), "disk")))
     assert np.array_equal(found.uv, V[:, :2] + 1000) and found.untangled == 4 and found.warnings == ()
 
@@ -73,7 +56,7 @@ def test_a_conformal_map_to_a_rectangle_is_about_its_middle_and_stretched_where_
 ):
     uv = V[:, :2] * [1, 0.5]
     monkeypatch.setattr(
-        named_maps, "conformal_rectangle", lambda *_: done(SimpleNamespace(uv=uv, aspect=0.5, straightened=0))
+        named_maps, "conformal_rectangle", lambda *_: worked(SimpleNamespace(uv=uv, aspect=0.5, straightened=0))
     )
     found, _ = told(named_maps.conformal_map(NamedProblem(V, F, np.ones(8), "rectangle", OUTLINE[::2], aspect)))
     assert found.uv == pytest.approx((uv - [0.5, 0.25]) * [1, aspect / 0.5 if stretched else 1])
@@ -86,12 +69,12 @@ def test_a_conformal_map_to_a_rectangle_is_about_its_middle_and_stretched_where_
 def test_a_polar_map_puts_every_vertex_into_the_middle_of_its_cell(cornered, folds, balance, turned, monkeypatch):
     asked, left = [], [folds, 1]
     first = NamedMap(V[:, :2] * [4, 1], "conformal", warnings=("first",))
-    monkeypatch.setattr(named_maps, "conformal_map", lambda disk: done(first))
+    monkeypatch.setattr(named_maps, "conformal_map", lambda disk: worked(first))
     cells = SimpleNamespace(cells=SimpleNamespace(centroid="centroids"), site_weights=np.arange(9.0))
 
     def transport(sites, mass, domain):
         asked.append((sites, mass, domain))
-        return done(cells)
+        return worked(cells)
 
     def diagram(sites, weights, domain):
         asked.append(weights)
@@ -143,7 +126,7 @@ def test_diagrams_are_those_of_the_largest_chart_in_its_domain(domain, monkeypat
 
     charts = SimpleNamespace(charts=[chart(5, F[:2]), chart([3, 4, 5], F), chart(7, F[:3])])
     monkeypatch.setattr(
-        diagrams, "disk_charts", lambda surface, faces, fill_holes: done(charts if not fill_holes else None)
+        diagrams, "disk_charts", lambda surface, faces, fill_holes: worked(charts if not fill_holes else None)
     )
     monkeypatch.setattr(diagrams, "rectangle_corners", lambda *_: "of a rectangle")
     monkeypatch.setattr(diagrams, "sharpest_corners", lambda *_: "sharpest")
@@ -151,7 +134,7 @@ def test_diagrams_are_those_of_the_largest_chart_in_its_domain(domain, monkeypat
     def polar(problem):
         asked["problem"] = problem
         cells = SimpleNamespace(site_weights="weights", residual=0.5, iterations=6)
-        return done(SimpleNamespace(cells=cells, sites="sites", uv=V[:, :2] * [4, 3]))
+        return worked(SimpleNamespace(cells=cells, sites="sites", uv=V[:, :2] * [4, 3]))
 
     def planar(sites, weights, shape):
         asked["shape"] = (sites, weights, shape)
@@ -183,12 +166,12 @@ def test_diagrams_of_the_sphere_are_of_what_is_chosen(monkeypatch):
 
     def conformal(vertices, triangles):
         asked["closed"] = vertices, triangles
-        return done(SimpleNamespace(triangles=T, sites="sites"))
+        return worked(SimpleNamespace(triangles=T, sites="sites"))
 
     def transport(sites, mass, hull):
         asked["mass"] = mass
         cells = SimpleNamespace(hull="hull")
-        return done(SimpleNamespace(site_weights="weights", cells=cells, residual=0.25, iterations=3))
+        return worked(SimpleNamespace(site_weights="weights", cells=cells, residual=0.25, iterations=3))
 
     monkeypatch.setattr(diagrams, "conformal_sphere", conformal)
     monkeypatch.setattr(diagrams, "sphere_transport", transport)
@@ -215,8 +198,8 @@ def test_the_first_vertex_whose_faces_can_be_straightened_is_put_onto_the_pole(f
         tried.append((int(vertex), bool(free[vertex]), bool(free[7]), bool(free.any())))
         assert np.array_equal(moved[vertex], target) and (area >= 0).all()
         if vertex not in fails:
-            return done(moved + 0.0 if not folds else -moved)
-        return done(None)
+            return worked(moved + 0.0 if not folds else -moved)
+        return worked(None)
 
     monkeypatch.setattr(pole_vertices, "straighten_around", straighten)
     monkeypatch.setattr(
@@ -246,7 +229,7 @@ def test_first_meshes_by_way_of_the_sphere(state, vertices, monkeypatch):
     component = SimpleNamespace(vertices=V, triangles=F, area=np.full(8, 0.25), to_reopen="edges")
     maps = SimpleNamespace(
         component=component,
-        of_sphere=lambda density: done(None if state == "no map" else pair),
+        of_sphere=lambda density: worked(None if state == "no map" else pair),
         give_up=given_up.append,
     )
 
@@ -320,7 +303,7 @@ def test_first_meshes_by_charts_are_stitched_unless_one_has_no_map(fails, monkey
 
     def mesh(maps, k, loop, boundary, count, density, options):
         asked.append((k, loop, count))
-        return done((None, ()) if k == fails else (f"mesh {k}", (f"told {k}",)))
+        return worked((None, ()) if k == fails else (f"mesh {k}", (f"told {k}",)))
 
     def inner(charts, boundaries, density, left):
         asked.append(left)

@@ -6,14 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.cutting import cuts
-from omt_uv.solver.progress import Progress, drain
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    return value
+from omt_uv.solver.progress import drain
 
 
 class Net:
@@ -50,7 +46,7 @@ def best(monkeypatch):
 
         def searching(self, component, topology, k, finder):
             tried.append("search")
-            return done(("seams", "ends"))
+            return worked(("seams", "ends"))
 
         monkeypatch.setattr(cuts, "cut_component", plain)
         monkeypatch.setattr(cuts._Cutter, "_search_component", searching)
@@ -139,7 +135,7 @@ def test_seams_are_searched_with_what_makes_a_disk(boundaries, handles, disk, ch
 
         def __call__(self, component, base):
             asked.append(("search", base.tolist()))
-            return done(np.arange(4) < chosen)
+            return worked(np.arange(4) < chosen)
 
     monkeypatch.setattr(cuts, "cut_component", plain)
     monkeypatch.setattr(cuts, "_tips", lambda component, chosen: ("ends", int(chosen.sum())))

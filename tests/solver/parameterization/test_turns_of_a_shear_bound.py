@@ -8,16 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.parameterization import shear_bound
 from omt_uv.solver.parameterization.shear_bound import bound_shear
-from omt_uv.solver.progress import Progress
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    return value
 
 
 @dataclass
@@ -68,13 +62,13 @@ def bounded(monkeypatch):
 
         def first(search, prepared, maps, map_charts, free, early):
             asked.append(("first", free))
-            return done(rounds[0])
+            return worked(rounds[0])
 
         def parting(search, last, crossing, k, worse):
             asked.append(("apart", last.name, crossing is not None, k))
             found = parts.pop(0) if parts else {}
             flag = crossings.pop(0) if crossings else False
-            return done((found, [], flag))
+            return worked((found, [], flag))
 
         def of(last, missed, apart, flat, spread, changes, tried):
             return SimpleNamespace(
@@ -86,15 +80,15 @@ def bounded(monkeypatch):
             new = rest.pop(0) if rest else None
             if ask_end == len([a for a in asked if a[0] == "cut"]):
                 early.is_asked = True
-            return done(last if new == "same" else new)
+            return worked(last if new == "same" else new)
 
         def spare(search, last, map_sparing, early):
             asked.append(("spared", last.name))
-            return done(spared or last)
+            return worked(spared or last)
 
         def shorter(search, best, map_charts, map_sparing, early):
             asked.append(("shorter", best.name))
-            return done(best)
+            return worked(best)
 
         class Early:
             is_asked = False

@@ -7,20 +7,14 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.analysis import region_density
 from omt_uv.solver.errors import EmptyRegionError, MeshError, ShareError, SoftRegionError
 from omt_uv.solver.parameterization import chart_map as chart_maps
 from omt_uv.solver.parameterization import convex_maps, convexity
 from omt_uv.solver.parameterization.options import MapOptions
-from omt_uv.solver.progress import Progress, RunLog, drain
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    if isinstance(value, Exception):
-        raise value
-    return value
+from omt_uv.solver.progress import RunLog, drain
 
 
 @pytest.fixture
@@ -60,10 +54,10 @@ def first(monkeypatch):
 
         def coarse_map(disk, balance, log, draft):
             tried.append(f"coarse {draft}")
-            return done(coarse)
+            return worked(coarse)
 
         monkeypatch.setattr(chart_maps, "coarse_initial_map", coarse_map)
-        monkeypatch.setattr(chart_maps, "direct_initial_map", lambda *_: (tried.append("direct"), done("direct"))[1])
+        monkeypatch.setattr(chart_maps, "direct_initial_map", lambda *_: (tried.append("direct"), worked("direct"))[1])
         disk = SimpleNamespace(boundary=boundary, vertices=np.zeros((size, 3)), triangles=None, loop=None)
         found = drain(chart_maps._initial_map(disk, 0.0, log, draft, 0.1))
         return found, tried, log.warnings
@@ -132,7 +126,7 @@ def opened(monkeypatch):
 
         def open_(self, k, old, folded):
             asked.append((old.name, folded))
-            return done(refined)
+            return worked(refined)
 
         monkeypatch.setattr(convex_maps._Opening, "kept", keep)
         monkeypatch.setattr(convex_maps._Opening, "opened", open_)
@@ -180,7 +174,7 @@ def test_corners_are_refined_again_where_nobody_chose_them(state, pinned, option
     V, F = meshes.grid(1, 1)
     monkeypatch.setattr(convexity, "keep_convex", lambda *_: {} if state == "no start" else {0: V[:, :2]})
     refused = MeshError("No")
-    monkeypatch.setattr(convex_maps, "refined_again", lambda *_: done(refused if state == "no map" else V[:, :2]))
+    monkeypatch.setattr(convex_maps, "refined_again", lambda *_: worked(refused if state == "no map" else V[:, :2]))
     monkeypatch.setattr(convex_maps, "cut_as_mapped", lambda chart, uv: chart)
     monkeypatch.setattr(convex_maps, "_fixed", lambda *_: None)
     monkeypatch.setattr(convex_maps, "_as_before", lambda uv, old, triangles: uv)

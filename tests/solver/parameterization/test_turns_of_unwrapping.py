@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import done, told
 
 from omt_uv.solver.canonical.markers import ChartMarkers
 from omt_uv.solver.cutting.disk_charts import DiskCharts
@@ -51,23 +52,6 @@ def cut(count=1, **given):
 
 def task(count=1, markers=None, pins=None, cut_anew=False, **options):
     return unwrapping._Task(surface(count), UnwrapOptions(**options), pins, None, markers, cut_anew)
-
-
-def told(steps):
-    """The result of a solver and the fractions that it told."""
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
-
-
-def done(value, *fractions):
-    """A solver that is done as it begins."""
-    for fraction in fractions:
-        yield Progress("A", fraction)
-    return value
 
 
 # ---- the whole ----------------------------------------------------------------------------------------------

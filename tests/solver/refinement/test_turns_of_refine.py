@@ -8,22 +8,17 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.errors import MeshError
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import refine as refinement
 from omt_uv.solver.refinement.refine import RefinementOptions, refine
 
 V, F = meshes.bumpy(3, 3)
 UV = V[:, :2].copy()
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    return value
 
 
 @dataclass
@@ -74,7 +69,7 @@ def refined(monkeypatch):
             def taking(*words):
                 calls.append(name)
                 found = ("symmetry" if value else None, 2 * words[2])
-                return done(found) if name == "relaxed" else found
+                return worked(found) if name == "relaxed" else found
 
             return taking
 
@@ -103,14 +98,14 @@ def refined(monkeypatch):
 
         def moved(problem, w, pins):
             calls.append(f"pins {len(pins.vertices)}")
-            return done((problem, w))
+            return worked((problem, w))
 
         monkeypatch.setattr(refinement, "move_pins", moved)
         monkeypatch.setattr(refinement, "_may_be_tense", lambda *_: tense)
 
         def smoothed(problem, by_triangle, w, weight):
             calls.append(f"smoothed {weight:g}")
-            return done(w)
+            return worked(w)
 
         monkeypatch.setattr(refinement, "_smoothed_if_tense", smoothed)
 
@@ -118,7 +113,7 @@ def refined(monkeypatch):
             initial = "notched" if problem.initial.warnings == ("notches",) else "plain"
             calls.append((initial, problem.loop, problem.with_barrier, problem.mirrored, warm, multiplier, ahead))
             scale = 1 if initial == "plain" else 10
-            return done(Result(w * scale))
+            return worked(Result(w * scale))
 
         monkeypatch.setattr(refinement, "minimise_in_stages", stages)
         monkeypatch.setattr(

@@ -8,28 +8,14 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import done, told
 
-from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.progress import drain
 from omt_uv.solver.registration import coarse_start, landmark_flow, register
 from omt_uv.solver.registration.coarse_start import _Trial
 from omt_uv.solver.registration.landmark_flow import Drawn
 
 V, F = meshes.icosphere(0)
-
-
-def done(value, *fractions):
-    for fraction in fractions:
-        yield Progress("A", fraction)
-    return value
-
-
-def told(steps):
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
 
 
 class Placed(SimpleNamespace):

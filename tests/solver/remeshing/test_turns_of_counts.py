@@ -6,25 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import told, worked
 
 from omt_uv.solver.errors import CountError
-from omt_uv.solver.progress import Progress
 from omt_uv.solver.remeshing import remesh_surface as remeshes
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    return value
-
-
-def told(steps):
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
 
 
 def options(vertices=True, **more):
@@ -54,7 +39,7 @@ def made(monkeypatch):
             asked.append((k, target))
             made = np.zeros((target + more, 3))
             other = np.zeros((7, 3))
-            return done(SimpleNamespace(points=made if vertices else other, triangles=other if vertices else made))
+            return worked(SimpleNamespace(points=made if vertices else other, triangles=other if vertices else made))
 
         monkeypatch.setattr(remeshes, "remesh_component", component)
         density = np.ones(len(areas))
@@ -98,7 +83,7 @@ def test_corners_are_kept_while_the_count_allows_it(count, corners, kept, monkey
 
     monkeypatch.setattr(remeshes, "_min_counts", least)
     monkeypatch.setattr(
-        remeshes, "_with_min_counts", lambda maps, density, count, least, options: done((["made"], least))
+        remeshes, "_with_min_counts", lambda maps, density, count, least, options: worked((["made"], least))
     )
     steps = remeshes._all_components([], None, count, options(preserve_boundary=kept))
     if corners is None or (not kept and count < 20):
@@ -118,7 +103,7 @@ def test_what_collapses_to_more_is_tried_again_until_there_is_no_room(turns, mon
 
     def made(maps, density, count, least, options):
         asked.append(least.tolist())
-        return done((["made"] if len(asked) == turns else [], least + [2, 3]))
+        return worked((["made"] if len(asked) == turns else [], least + [2, 3]))
 
     monkeypatch.setattr(remeshes, "_min_counts", lambda *_: np.array([4, 4]))
     monkeypatch.setattr(remeshes, "_with_min_counts", made)
@@ -161,7 +146,7 @@ def test_what_adds_no_detail_and_what_closed_surfaces_cannot_have_is_told(
     seen = []
     monkeypatch.setattr(remeshes, "_small", lambda components, level, count: seen.append((level[0], count)))
     results = [SimpleNamespace(triangles=np.zeros((count + odd, 3)), warnings=("same",)) for _ in range(1)]
-    monkeypatch.setattr(remeshes, "_all_components", lambda maps, level, count, options: done(results * 2))
+    monkeypatch.setattr(remeshes, "_all_components", lambda maps, level, count, options: worked(results * 2))
     monkeypatch.setattr(remeshes, "_joined", lambda results, source, warnings, rounds: (warnings, rounds))
     frame = SimpleNamespace(vertices=None, triangles=None)
     source = SimpleNamespace(

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import done
 
 from omt_uv.solver.errors import CrowdedError
 from omt_uv.solver.mesh.topology import pair_keys
@@ -14,13 +15,6 @@ from omt_uv.solver.progress import Progress, drain
 from omt_uv.solver.remeshing import remesh_component as components
 from omt_uv.solver.remeshing.edits.vertex_count import StuckError
 from omt_uv.solver.remeshing.initial import initial_mesh
-
-
-def done(value, *fractions):
-    for fraction in fractions:
-        yield Progress("A", fraction)
-    return value
-
 
 # ---- attempts -----------------------------------------------------------------------------------------------
 

@@ -7,16 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import worked
 
-from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import rehearsal
 from omt_uv.solver.seams.rehearsal import Rehearsal
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    return value
 
 
 @dataclass(frozen=True)
@@ -51,7 +46,7 @@ def mine(monkeypatch):
 
     def of(self, one):
         asked.append(one.cut.cost)
-        return done(one.cut.shears)
+        return worked(one.cut.shears)
 
     monkeypatch.setattr(Rehearsal, "of", of)
     return Rehearsal(None, None, None, None, {}), asked
@@ -100,10 +95,12 @@ def kept(mine, monkeypatch):
 
         def make(self, one, bound, asked):
             bounds.append(round(bound / one.cut.spread, 9))
-            return done([(c, c.cut.shears) for c in (rest.pop(0) if rest else [])])
+            return worked([(c, c.cut.shears) for c in (rest.pop(0) if rest else [])])
 
         monkeypatch.setattr(Rehearsal, "_longer", make)
-        monkeypatch.setattr(Rehearsal, "_shorter", lambda self, one, sheared, asked: done((one, ("shorter", sheared))))
+        monkeypatch.setattr(
+            Rehearsal, "_shorter", lambda self, one, sheared, asked: worked((one, ("shorter", sheared)))
+        )
         monkeypatch.setattr(rehearsal, "grow", lambda task, cut, most: ("grown", task.bound, most))
         fractions, steps = [], one.kept(first, asked)
         try:
@@ -202,7 +199,7 @@ def test_the_same_coarse_surface_is_mapped_once(state, monkeypatch):
         asked.append(None if density is None else density.tolist())
         if state == "refused":
             raise MeshError("No")
-        return done(0.25)
+        return worked(0.25)
 
     log = (lambda coarse: np.array([1.0, 2.0, 3.0])) if state == "dense" else (lambda coarse: None)
     component = SimpleNamespace(ends=np.array([[0, 1], [1, 2]]), positions=np.eye(3) * 1.1)

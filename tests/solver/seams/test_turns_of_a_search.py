@@ -8,16 +8,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import told, worked
 
-from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import search as searches
 from omt_uv.solver.seams.search import SeamSearch
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    return value
 
 
 @dataclass
@@ -34,15 +29,6 @@ class Cut:
         return SimpleNamespace(graph=SimpleNamespace(is_whole=lambda *_: self.whole))
 
 
-def told(steps):
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
-
-
 @pytest.fixture
 def best(monkeypatch):
     """The best cut, and what was tried for it."""
@@ -57,7 +43,7 @@ def best(monkeypatch):
         def symmetric(self, component, base, bound, m):
             tried.append("exact" if m.exact else "near")
             assert base == "base"
-            return done(exact if m.exact else near)
+            return worked(exact if m.exact else near)
 
         def modelled(self, component):
             tried.append("model")
@@ -66,16 +52,16 @@ def best(monkeypatch):
         def grown(self, setting, task, base, m):
             tried.append("first")
             assert m is None and base == "free"
-            return done(first)
+            return worked(first)
 
         def shortened(self, found):
             tried.append(f"shorten {found.name}")
-            return done(shorter or Cut(f"short {found.name}", 0.95 * found.score))
+            return worked(shorter or Cut(f"short {found.name}", 0.95 * found.score))
 
         def several(self, component, base, m, bound, more):
             tried.append(list(more))
             assert (base, m) == ("free", None)
-            return done([Cut(f"other {k}", 1.0) for k in more])
+            return worked([Cut(f"other {k}", 1.0) for k in more])
 
         setting = SimpleNamespace(task=lambda bound, root: (bound, root), extremity=lambda: "root")
         monkeypatch.setattr(SeamSearch, "_symmetric", symmetric)
@@ -87,7 +73,7 @@ def best(monkeypatch):
         monkeypatch.setattr(SeamSearch, "_trials", lambda *_: trials)
         monkeypatch.setattr(SeamSearch, "_worth_of_symmetry", lambda *_: worth)
         pick = (lambda cuts: cuts[0]) if chosen is None else (lambda cuts: cuts[chosen])
-        rehearsal = SimpleNamespace(best_of=lambda cuts, asked: done(pick(cuts)))
+        rehearsal = SimpleNamespace(best_of=lambda cuts, asked: worked(pick(cuts)))
         monkeypatch.setattr(SeamSearch, "_rehearsal", lambda *_: rehearsal)
         mine = SeamSearch(np.zeros(1), None, None)
         given = ("coarse", "model") if plain else None
@@ -162,12 +148,12 @@ def test_symmetric_cuts_are_the_best_of_several_made_shorter(count, monkeypatch)
     monkeypatch.setattr(
         SeamSearch,
         "_several_grown",
-        lambda self, c, base, m, bound, trials: done(cuts if list(trials) == [0, 1, 2, 3] else None),
+        lambda self, c, base, m, bound, trials: worked(cuts if list(trials) == [0, 1, 2, 3] else None),
     )
     monkeypatch.setattr(
-        SeamSearch, "_rehearsal", lambda *_: SimpleNamespace(best_of=lambda cuts, asked: done(cuts[-1]))
+        SeamSearch, "_rehearsal", lambda *_: SimpleNamespace(best_of=lambda cuts, asked: worked(cuts[-1]))
     )
-    monkeypatch.setattr(SeamSearch, "_shortened", lambda self, found: done(Cut("short " + found.name, 1.0)))
+    monkeypatch.setattr(SeamSearch, "_shortened", lambda self, found: worked(Cut("short " + found.name, 1.0)))
     found, fractions = told(SeamSearch(np.zeros(1), None, None)._symmetric(None, None, 0.5, None))
     assert found is None if not count else found.name == f"short {count - 1}"
     grown = searches.GROWN
@@ -197,7 +183,7 @@ def test_cuts_are_grown_on_surfaces_until_one_cannot_get_along_the_plane(by_surf
     monkeypatch.setattr(SeamSearch, "_modelled", modelled)
     monkeypatch.setattr(SeamSearch, "_setting", setting)
     monkeypatch.setattr(
-        SeamSearch, "_grown_on", lambda self, setting, task, base, mirror: done((task.bound, task.root))
+        SeamSearch, "_grown_on", lambda self, setting, task, base, mirror: worked((task.bound, task.root))
     )
     bound = (lambda coarse, model: 10 + coarse) if by_surface else 0.5
     mine = SeamSearch(np.zeros(1), None, None)
@@ -248,26 +234,26 @@ def again(monkeypatch):
 
         def added_to(self, component, found, spread):
             tried.append("added")
-            return done(added or Grown("added"))
+            return worked(added or Grown("added"))
 
         def grown_further(self, component, found, spread):
             tried.append("further")
-            return done(further or Grown("further"))
+            return worked(further or Grown("further"))
 
         def grown_finer(self, component, found, spread):
             tried.append("finer" if found.mirror is None else "finer mirrored")
-            return done(rest.pop(0) if rest else Grown("finer"))
+            return worked(rest.pop(0) if rest else Grown("finer"))
 
         def kept(best, asked):
             tried.append(f"rehearsed {asked:.3f}")
-            return done((best, 0.25))
+            return worked((best, 0.25))
 
         monkeypatch.setattr(SeamSearch, "_added", added_to)
         monkeypatch.setattr(SeamSearch, "_grown_further", grown_further)
         monkeypatch.setattr(SeamSearch, "_grown_finer", grown_finer)
         monkeypatch.setattr(SeamSearch, "_rehearsal", lambda *_: SimpleNamespace(kept=kept))
         monkeypatch.setattr(
-            SeamSearch, "_shortened", lambda self, best: done(Grown("short " + best.name, is_stuck=best.is_stuck))
+            SeamSearch, "_shortened", lambda self, best: worked(Grown("short " + best.name, is_stuck=best.is_stuck))
         )
 
         @dataclass(frozen=True)

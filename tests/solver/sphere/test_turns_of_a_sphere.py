@@ -7,20 +7,12 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.errors import FoldedUVError, PrecisionError, TransportError
-from omt_uv.solver.progress import Progress
 from omt_uv.solver.sphere import sphere_map as spheres
 
 V, F = meshes.icosphere(0)
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    if isinstance(value, Exception):
-        raise value
-    return value
 
 
 @pytest.fixture
@@ -34,30 +26,30 @@ def mapped(monkeypatch):
 
         def sites(*_):
             taken.append("sites")
-            return done(conformal if conformal == "sites" else SimpleNamespace(sites="sites"))
+            return worked(conformal if conformal == "sites" else SimpleNamespace(sites="sites"))
 
         def conformal_sites(*_):
             taken.append("sites")
-            return done(PrecisionError("too thin") if conformal == "sites" else SimpleNamespace(sites=1 * V))
+            return worked(PrecisionError("too thin") if conformal == "sites" else SimpleNamespace(sites=1 * V))
 
         def straightened(*_):
             taken.append("conformal")
             failed = conformal == "sphere"
-            return done(
+            return worked(
                 PrecisionError("too thin") if failed else SimpleNamespace(positions=2 * V, sites=1 * V, triangles=F)
             )
 
         def transported(*_):
             taken.append("transport")
-            return done(transport or 3 * V)
+            return worked(transport or 3 * V)
 
         def flow(*_):
             taken.append("flow")
-            return done(SimpleNamespace(moser=4 * V, positions=5 * V))
+            return worked(SimpleNamespace(moser=4 * V, positions=5 * V))
 
         def multilevel(*_):
             taken.append("multilevel")
-            return done((6 * V, None))
+            return worked((6 * V, None))
 
         failures = [first] if first is not None else []
 
@@ -65,8 +57,8 @@ def mapped(monkeypatch):
             of = "quads" if joined and given.get("polygons") is not None and given["polygons"][0] == 7 else "own"
             taken.append(f"refine {round(np.linalg.norm(start[0]))} {given['balance']:g} {of}")
             if failures:
-                return done(failures.pop())
-            return done(SimpleNamespace(positions=start, area_error=error, status="s", iterations=3, residual=0.5))
+                return worked(failures.pop())
+            return worked(SimpleNamespace(positions=start, area_error=error, status="s", iterations=3, residual=0.5))
 
         monkeypatch.setattr(spheres, "conformal_sites", conformal_sites)
         monkeypatch.setattr(spheres, "straightened", straightened)
@@ -176,7 +168,7 @@ def test_caps_that_are_fanned_are_mapped_as_they_are_where_that_folds_them(metho
         n = len(V) + (given == "fans")
         rows = np.concatenate([flat, np.ones((1, 3))])[:n]
         found = {"positions": rows, "conformal": rows, "sites": rows, "status": "", "iterations": 0, "residual": 0.0}
-        return done(spheres.SphereMap(**found, warnings=(), flow=None))
+        return worked(spheres.SphereMap(**found, warnings=(), flow=None))
 
     monkeypatch.setattr(spheres, "with_polygon_fans", lambda given: "fans")
     monkeypatch.setattr(spheres, "_mapped", mapping)

@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import told, worked
 
 from omt_uv.solver.errors import FoldedUVError, PrecisionError
-from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.continuation import StageResult
 from omt_uv.solver.refinement.continuation_rules import QUALITIES, Quality
 from omt_uv.solver.sphere import multilevel
@@ -18,23 +19,6 @@ from omt_uv.solver.sphere import refine as spheres
 
 V, F = meshes.icosphere(0)
 QUALITY = Quality(area_error=0.01, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=60, tolerance=3e-2)
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    if isinstance(value, Exception):
-        raise value
-    return value
-
-
-def told(steps):
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
 
 
 # ---- stages -------------------------------------------------------------------------------------------------
@@ -56,7 +40,7 @@ def staged(monkeypatch):
         def minimise(current, p, limits, k):
             asked.append((current.weight, limits, k))
             status, steps, *_ = ends[len(asked) - 1]
-            return done(StageResult(p + 1, steps, 0.5, 7.0, status))
+            return worked(StageResult(p + 1, steps, 0.5, 7.0, status))
 
         monkeypatch.setattr(spheres, "with_projected_targets", projected)
         monkeypatch.setattr(spheres, "with_both_diagonals", lambda problem, p: problem)
@@ -129,12 +113,12 @@ class Found:
 def test_symmetric_maps_are_taken_where_they_have_their_areas_or_others_have_not_either(
     symmetric, error, free, balance, name, monkeypatch
 ):
-    monkeypatch.setattr(spheres, "untangle_on_sphere", lambda faces, assembly, p: done((p, 4)))
+    monkeypatch.setattr(spheres, "untangle_on_sphere", lambda faces, assembly, p: worked((p, 4)))
     found = SimpleNamespace(images="images") if symmetric is not None else None
     monkeypatch.setattr(spheres, "find_symmetry", lambda *_: found)
     ours = Found(V, error, "symmetric") if symmetric else None
-    monkeypatch.setattr(spheres, "_symmetric", lambda *_: done((ours, 5)))
-    monkeypatch.setattr(spheres, "_stages", lambda problem, p, balance, settings: done(Found(V, free, "free")))
+    monkeypatch.setattr(spheres, "_symmetric", lambda *_: worked((ours, 5)))
+    monkeypatch.setattr(spheres, "_stages", lambda problem, p, balance, settings: worked(Found(V, free, "free")))
     area = np.full(len(F), 1.0)
     result, fractions = told(spheres.sphere_refine(V, F, V, area, balance=balance))
     if name == "free or symmetric":
@@ -144,7 +128,7 @@ def test_symmetric_maps_are_taken_where_they_have_their_areas_or_others_have_not
 
 
 def test_starts_that_stay_folded_are_refused(monkeypatch):
-    monkeypatch.setattr(spheres, "untangle_on_sphere", lambda faces, assembly, p: done((-p, 4)))
+    monkeypatch.setattr(spheres, "untangle_on_sphere", lambda faces, assembly, p: worked((-p, 4)))
     with pytest.raises(FoldedUVError):
         drain(spheres.sphere_refine(V, F, V, np.ones(len(F))))
     with pytest.raises(ValueError, match="balance"):
@@ -160,12 +144,12 @@ def test_symmetric_starts_are_averaged_straightened_and_averaged_again(state, mo
         spheres, "symmetric_map", lambda images, start: None if state == "none" else (symmetry, 2 * start)
     )
     monkeypatch.setattr(
-        spheres, "untangle_on_sphere", lambda faces, assembly, p: (calls.append("straight"), done((p, 6)))[1]
+        spheres, "untangle_on_sphere", lambda faces, assembly, p: (calls.append("straight"), worked((p, 6)))[1]
     )
     monkeypatch.setattr(
         spheres,
         "_stages",
-        lambda problem, p, balance, settings: done((problem.symmetry is symmetry, np.linalg.norm(p[0]))),
+        lambda problem, p, balance, settings: worked((problem.symmetry is symmetry, np.linalg.norm(p[0]))),
     )
 
     @dataclass(frozen=True)
@@ -187,7 +171,7 @@ def test_what_is_relaxed_has_its_faces_or_equilateral_ones(regular, monkeypatch)
 
     def stages(problem, p, balance, settings):
         asked.append(problem)
-        return done(SimpleNamespace(positions=p, iterations=9))
+        return worked(SimpleNamespace(positions=p, iterations=9))
 
     monkeypatch.setattr(spheres, "_stages", stages)
     target = np.arange(1.0, len(F) + 1)
@@ -222,7 +206,7 @@ def test_ways_to_the_tetrahedron_are_tried_until_no_face_reaches_around(cosines,
     def way(levels, regular):
         tried.append((levels, regular))
         cosine = cosines[len(tried) - 1]
-        return done(PrecisionError("no") if cosine is None else (len(tried) - 1, 10))
+        return worked(PrecisionError("no") if cosine is None else (len(tried) - 1, 10))
 
     def collapse(vertices, triangles, mass, attempt=0):
         asked.append(attempt)
@@ -245,7 +229,7 @@ def test_ways_to_the_tetrahedron_are_tried_until_no_face_reaches_around(cosines,
 
 def test_where_no_way_leads_the_last_error_is_raised(monkeypatch):
     count = iter(range(99))
-    monkeypatch.setattr(multilevel, "_from_tetrahedron", lambda *_: done(PrecisionError(f"no {next(count)}")))
+    monkeypatch.setattr(multilevel, "_from_tetrahedron", lambda *_: worked(PrecisionError(f"no {next(count)}")))
     monkeypatch.setattr(multilevel, "collapse_to_tetrahedron", lambda *_: None)
     with pytest.raises(PrecisionError, match=f"no {multilevel.MOST_ATTEMPTS - 1}"):
         drain(multilevel._best_of_attempts([SimpleNamespace(vertices=V, triangles=F, mass=None)]))
@@ -259,11 +243,11 @@ def test_small_levels_are_tried_again_and_large_ones_come_once(sizes, few, monke
 
     def attempts(some):
         asked.append([len(level.vertices) for level in some])
-        return done(("start", 5))
+        return worked(("start", 5))
 
     def prolonged(level, positions):
         asked.append(len(level.vertices))
-        return done((positions, 1))
+        return worked((positions, 1))
 
     monkeypatch.setattr(multilevel, "_best_of_attempts", attempts)
     monkeypatch.setattr(multilevel, "_prolonged", prolonged)

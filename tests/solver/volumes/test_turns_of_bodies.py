@@ -6,28 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import told, worked
 
 from omt_uv.solver.errors import TetrahedraError
-from omt_uv.solver.progress import Progress
 from omt_uv.solver.volumes import body_map
 from omt_uv.solver.volumes.meshing import TetMesh
-
-
-def done(value):
-    yield Progress("A", 0.0)
-    yield Progress("A", 1.0)
-    if isinstance(value, Exception):
-        raise value
-    return value
-
-
-def told(steps):
-    found = []
-    try:
-        while True:
-            found.append(next(steps).fraction)
-    except StopIteration as stop:
-        return stop.value, found
 
 
 def corner():
@@ -47,7 +30,7 @@ def test_bodies_are_untangled_refined_and_made_exact(domain, tangled, given, mon
     def step(name, value):
         def taking(*words, **more):
             calls.append((name, words, more))
-            return done(value)
+            return worked(value)
 
         return taking
 
@@ -82,7 +65,7 @@ def test_the_flow_of_the_paper_is_taken_by_its_name(monkeypatch):
     mesh, sphere = corner()
     monkeypatch.setattr(body_map, "harmonic", lambda mesh, start: start)
     flow = SimpleNamespace(positions="flowed", errors=(3.0, 2.0, 1.0))
-    monkeypatch.setattr(body_map, "paper_flow", lambda *_: done(flow))
+    monkeypatch.setattr(body_map, "paper_flow", lambda *_: worked(flow))
     found, positions, steps = told(body_map._mapped(mesh, sphere, "ball", "flow", False))[0]
     assert found is mesh and (positions, steps) == ("flowed", 2)
 
@@ -94,7 +77,7 @@ def test_room_is_made_on_the_sphere_and_on_the_cube_after_it(domain, monkeypatch
 
     def unlocked(mesh, positions, held):
         calls.append((float(np.abs(positions).max()), held))
-        return done((TetMesh(mesh.points + 1, mesh.tets), positions))
+        return worked((TetMesh(mesh.points + 1, mesh.tets), positions))
 
     monkeypatch.setattr(body_map, "harmonic", lambda mesh, start: start)
     monkeypatch.setattr(body_map, "on_cube", lambda positions: 7 * np.ones_like(positions))
@@ -126,9 +109,9 @@ def test_one_body_goes_into_another_through_the_ball(placed, fails, monkeypatch)
     monkeypatch.setattr(body_map, "TetLocation", Location)
     monkeypatch.setattr(body_map, "tet_problem", lambda *_: "problem")
     refused = TetrahedraError("No")
-    monkeypatch.setattr(body_map, "untangled", lambda *_: done(refused if fails == "untangled" else "free"))
+    monkeypatch.setattr(body_map, "untangled", lambda *_: worked(refused if fails == "untangled" else "free"))
     exact = SimpleNamespace(points=mesh.points + 1, positions=5 * mesh.points)
-    monkeypatch.setattr(body_map, "exact_volumes", lambda *_: done(refused if fails == "exact" else exact))
+    monkeypatch.setattr(body_map, "exact_volumes", lambda *_: worked(refused if fails == "exact" else exact))
     at = sphere * 0.5 if placed else None
     found, _ = told(body_map.into_body(first, other, at))
     assert np.array_equal(asked[0][0], sphere[::-1]) and np.array_equal(asked[0][2], 3 * mesh.points)
