@@ -56,3 +56,9 @@ def settle_context() -> None:
     that was changed, and a crash later. Read anew, they make the open scene the owner: docs/blender_4_2.md has more.
     """
     _ = bpy.context.tool_settings
+
+
+def open_empty() -> None:
+    """An empty file takes the place of the open one."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    settle_context()

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..blender.mesh import new_mesh
-from ..blender.versions import known_options, settle_context
+from ..blender.versions import known_options, open_empty, settle_context
 from .formats.headers import check_header
 from .formats.off import read_off
 from .ply_uvs import add_uvs
@@ -102,8 +102,7 @@ def _reader(read: Callable[[str], object]) -> Callable[[str], None]:
     """A reader of a format that adds to the open session."""
 
     def run(path: str) -> None:
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        settle_context()
+        open_empty()
         read(path)
 
     return run

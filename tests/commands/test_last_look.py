@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+import uv_scenes
 
 # Words of a command, whether only overlap inside of islands counts, and whether there were UVs that may have had some.
 COMMANDS = [
@@ -24,15 +25,8 @@ COMMANDS = [
 @pytest.fixture(scope="module")
 def patch_file(tmp_path_factory, package):
     """Two patches beside one another, with UVs and a painted group."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    obj = scenes.bump(5, 4)
-    points = np.array([v.co for v in obj.data.vertices]) + [0.3, 0, 0]
-    faces = np.array([p.vertices for p in obj.data.polygons])
-    bpy.data.objects.remove(obj)
-    both = np.concatenate([points, points * [-1, 1, 1]])
-    obj = scenes.add(both, np.concatenate([faces, faces + len(points)]), "Patches")
-    uv = scenes.seen_from_above(obj)
-    scenes.set_uv(obj, uv * 0.1 + np.repeat([[0, 0], [0.5, 0.5]], len(uv) // 2, axis=0))
+    scenes.open_empty()
+    obj = uv_scenes.patches()
     group = obj.vertex_groups.new(name="Region")
     for k in range(10):
         group.add([k], 1.0, "REPLACE")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bpy
+
 import numpy as np
 import scenes
 
@@ -23,4 +25,17 @@ def ring():
         np.stack([x, y, 0.5 * np.sin(3 * x)], axis=1), np.stack([k, after, after + 24, k + 24], axis=1)[:, ::-1]
     )
     scenes.set_uv(obj, scenes.seen_from_above(obj, 0.3, (0.5, 0.5)))
+    return obj
+
+
+def patches():
+    """Two equal patches on the two sides of x = 0, each an island seen from above."""
+    obj = scenes.bump(5, 4)
+    points = np.array([v.co for v in obj.data.vertices]) + [0.3, 0, 0]
+    faces = np.array([p.vertices for p in obj.data.polygons])
+    bpy.data.objects.remove(obj)
+    both = np.concatenate([points, points * [-1, 1, 1]])
+    obj = scenes.add(both, np.concatenate([faces, faces + len(points)]), "Patches")
+    uv = scenes.seen_from_above(obj)
+    scenes.set_uv(obj, uv * 0.1 + np.repeat([[0, 0], [0.5, 0.5]], len(uv) // 2, axis=0))
     return obj

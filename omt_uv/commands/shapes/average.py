@@ -142,7 +142,7 @@ def _write(options: argparse.Namespace, shapes: list[Registered], surface, polyg
     import numpy as np
 
     from ...blender.mesh import new_mesh
-    from ...blender.versions import settle_context
+    from ...blender.versions import open_empty
     from ...files.saving import save
     from ...files.verified import write_text
     from ...solver.mesh.geometry import vertex_areas
@@ -151,8 +151,7 @@ def _write(options: argparse.Namespace, shapes: list[Registered], surface, polyg
     triangles = surface.corner_vertex[surface.triangles]
     area = vertex_areas(surface.positions, triangles)
     found = mean_shape(np.array([shape.positions for shape in shapes]), area, options.scaled)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    settle_context()
+    open_empty()
     width = 1.2 * float(np.ptp(found.mean, axis=0)[0])
     rows = [(MEAN, found.mean, {DEVIATION: found.deviation})]
     rows += [

@@ -28,15 +28,15 @@ LEAST_COSINE = 1e-3
 CLEARLY = 0.3
 
 
-def face_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def face_occlusion(positions: np.ndarray, triangles: np.ndarray, sides: np.ndarray | None = None) -> np.ndarray:
     """Share (m,) in [0, 1] of the directions, each as a face would be lit from it, in which something hides a triangle.
 
     positions (n,3), triangles (m,3): 0 on convex bodies, near 1 deep within a cave. The outside of a part that is open
     or turned inside out is the side from which more of it is seen. Independent of place, direction and size but for
-    about 0.02 of noise.
+    about 0.02 of noise. sides (2,m) : what `hidden_sides` gives, where it is known
     """
-    hidden = hidden_sides(positions, triangles)
-    return _outer(hidden, face_areas(unit_size(positions, triangles), triangles), triangles, len(positions))
+    sides = hidden_sides(positions, triangles) if sides is None else sides
+    return _outer(sides, face_areas(unit_size(positions, triangles), triangles), triangles, len(positions))
 
 
 def hidden_sides(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -89,13 +89,9 @@ def outside_out(positions: np.ndarray, triangles: np.ndarray, hidden: np.ndarray
 
 
 def vertex_occlusion(positions: np.ndarray, triangles: np.ndarray, sides: np.ndarray | None = None) -> np.ndarray:
-    """Mean (n,) of `face_occlusion` over the triangles (m,3) around every vertex (n,3), 0 for those of none.
-
-    sides (2,m) : what `hidden_sides` gives, where it is known
-    """
-    sides = hidden_sides(positions, triangles) if sides is None else sides
+    """Mean (n,) of `face_occlusion` over the triangles (m,3) around every vertex (n,3), 0 for those of none."""
+    hidden = face_occlusion(positions, triangles, sides)
     area = np.maximum(face_areas(unit_size(positions, triangles), triangles), np.finfo(float).tiny)
-    hidden = _outer(sides, area, triangles, len(positions))
     around = np.bincount(triangles.ravel(), np.repeat(area, 3), len(positions))
     total = np.bincount(triangles.ravel(), np.repeat(area * hidden, 3), len(positions))
     return total / np.where(around > 0, around, 1)

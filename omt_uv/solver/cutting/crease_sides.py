@@ -114,10 +114,10 @@ def hard_borders(
 def cap_borders(component: CutComponent) -> np.ndarray:
     """Edges (e,) bool around the large flat sides of a component that sharp edges or bevels close off all around, as
     the ends of a barrel are: what is no disk is cut anyway, and a cut across one would leave it in petals."""
-    fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     joined, count = component.pair // 3, len(component.triangles)
     if component.vertex_count - len(joined) - len(component.boundary) + count == 1 and len(component.boundary):
         return np.zeros(len(joined), dtype=bool)
+    fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     level = (fold <= LEVEL) | ~np.isfinite(component.cost)
     side = graph_components(joined[level, 0], joined[level, 1], count)[1]
     corners = component.positions[component.triangles]

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
-from ..mesh.topology import graph_components, halfedges
+from ..mesh.topology import graph_components, halfedges, next_halfedge
 from .component import CutComponent
 
 # Times that all stretches of a cut are tried again.
@@ -172,14 +172,9 @@ def cut_classes(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     return (np.cumsum(is_first)[first] - 1)[found].reshape(-1, 3)
 
 
-def _next_corner(corner: np.ndarray) -> np.ndarray:
-    """The corner (k,) after each of these in its triangle, where the halfedge of the same number ends."""
-    return corner + 1 - 3 * (corner % 3 == 2)
-
-
 def _joined_corners(flat: np.ndarray, f: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of corners, (2k,) each, of the vertices flat (c,), that two halfedges f, s (k,) of an edge each join."""
-    next_f, next_s = _next_corner(f), _next_corner(s)
+    next_f, next_s = next_halfedge(f), next_halfedge(s)
     same = flat[f] == flat[s]
     rows = np.concatenate([f, next_f])
     return rows, np.concatenate([np.where(same, s, next_s), np.where(same, next_s, s)])
@@ -241,7 +236,7 @@ def _two_boundaries(component: CutComponent, cut: np.ndarray, tips: np.ndarray) 
     flat = component.triangles.ravel()
     border = cut_boundary(component, cut)
     on = np.zeros(component.vertex_count, dtype=bool)
-    on[flat[border]] = on[flat[_next_corner(border)]] = on[tips] = True
+    on[flat[border]] = on[flat[next_halfedge(border)]] = on[tips] = True
     # Only what is on a boundary comes apart: the corners of all other vertices stay together.
     corner = np.flatnonzero(on[flat])
     place = np.zeros(len(flat), dtype=np.int64)
@@ -251,10 +246,10 @@ def _two_boundaries(component: CutComponent, cut: np.ndarray, tips: np.ndarray) 
     rows, columns = _joined_corners(flat, f, s)
     joined = on[flat[rows]]
     count, copy = graph_components(place[rows[joined]], place[columns[joined]], len(corner))
-    sides, label = graph_components(copy[place[border]], copy[place[_next_corner(border)]], count)
+    sides, label = graph_components(copy[place[border]], copy[place[next_halfedge(border)]], count)
     if sides != 2:
         return None
-    ends = np.stack([f, _next_corner(f)], axis=1)
+    ends = np.stack([f, next_halfedge(f)], axis=1)
     return _TwoBoundaries(on, edges, np.where(on[flat[ends]], label[copy[place[ends]]], -1))
 
 

@@ -316,8 +316,8 @@ class _Cutter:
         again = searched and self.search is not None and self.search.is_again
         unrolled = net(component) if (self.extremities or searched) and not (filled or again) else None
         found = None if unrolled is None else unrolled.up_to(unrolled.most)
-        bounded = searched and topology.boundaries[k] > 0
-        if found is not None and not (bounded and found.is_comb(_needed(component, topology, k))):
+        toothed = found is not None and found.has_teeth and searched and topology.boundaries[k] > 0
+        if found is not None and not (toothed and found.is_comb(_needed(component, topology, k))):
             return found.cut, found.tips
         if searched and self.search is not None:
             return (yield from self._search_component(component, topology, k, self.search))

@@ -77,11 +77,16 @@ class Net:
         found = self.spread_out() if self.length <= length else self
         return found if found.length <= length else None
 
+    @property
+    def has_teeth(self) -> bool:
+        """Whether this net goes to so many vertices that it may be a comb."""
+        return len(self.tips) > TEETH
+
     def is_comb(self, needed: float) -> bool:
         """Whether this net is a slit at every segment of a band, as along the bevel of an end: to many vertices, and
         long beyond the length that is needed anyway. Around the corners of a lid slits are short."""
         side = float(np.sqrt(face_areas(self.component.positions, self.component.triangles).sum()))
-        return len(self.tips) > TEETH and self.length - needed > LONG_TEETH * side
+        return self.has_teeth and self.length - needed > LONG_TEETH * side
 
     def spread_out(self) -> Net:
         """This net or, where the component laid flat along it lies on itself, the shortest of some others along which

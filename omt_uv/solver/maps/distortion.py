@@ -193,14 +193,13 @@ def _surface_area(V, F, polygons):
     counted = _counted(polygons)
     area = polygon_areas(V, F, counted)
     whole = area if counted is None else np.bincount(counted, area)
+    every = np.ones(len(F), bool)
     if not np.isfinite(whole.sum()):
-        every = np.ones(len(F), bool)
-        raise NonFiniteError(
-            "The area of the faces is no finite number", "Scale them down", "face", _names(polygons, every)
-        )
+        text = "The area of the faces is no finite number"
+        raise NonFiniteError(text, "Scale them down", "face", _names(polygons, every))
     real = whole > NEGLIGIBLE_AREA * whole.sum()
     if not real.any():
-        raise ZeroAreaFaceError("No face has an area", "", "face", _names(polygons, np.ones(len(F), bool)))
+        raise ZeroAreaFaceError("No face has an area", "", "face", _names(polygons, every))
     return area, real if counted is None else real[counted]
 
 

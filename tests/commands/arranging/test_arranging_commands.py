@@ -7,23 +7,11 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+import uv_scenes
 
 
 def save(path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-
-
-def patches():
-    """Two equal patches on the two sides of x = 0, each an island seen from above."""
-    obj = scenes.bump(5, 4)
-    points = np.array([v.co for v in obj.data.vertices]) + [0.3, 0, 0]
-    faces = np.array([p.vertices for p in obj.data.polygons])
-    bpy.data.objects.remove(obj)
-    both = np.concatenate([points, points * [-1, 1, 1]])
-    obj = scenes.add(both, np.concatenate([faces, faces + len(points)]), "Patches")
-    uv = scenes.seen_from_above(obj)
-    scenes.set_uv(obj, uv * 0.1 + np.repeat([[0, 0], [0.5, 0.5]], len(uv) // 2, axis=0))
-    return obj
 
 
 @pytest.mark.parametrize("suffix", [".blend", ".obj"])
@@ -31,7 +19,7 @@ def patches():
     "words", [["stack"], ["symmetrize", "--halves", "stacked"], ["rectify"]], ids=["stack", "symmetrize", "rectify"]
 )
 def test_islands_are_arranged_in_files(package, run, tmp_path, words, suffix):
-    patches()
+    uv_scenes.patches()
     save(tmp_path / "in.blend")
     if suffix != ".blend":
         bpy.ops.wm.obj_export(filepath=str(tmp_path / f"in{suffix}"), export_materials=False)
@@ -47,7 +35,7 @@ def test_islands_are_arranged_in_files(package, run, tmp_path, words, suffix):
 
 
 def test_mirror_images_are_left_apart_on_request(package, run, tmp_path):
-    obj = patches()
+    obj = uv_scenes.patches()
     for vertex in obj.data.vertices:
         # No longer its own mirror image, so that only the mirrored motion fits.
         vertex.co.z += 0.2 * abs(vertex.co.x) * vertex.co.y

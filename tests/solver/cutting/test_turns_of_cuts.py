@@ -15,7 +15,7 @@ from omt_uv.solver.progress import drain
 class Net:
     """A net of a length, which is taken up to a limit."""
 
-    most, cut, tips = 50.0, "net", "tips"
+    most, cut, tips, has_teeth = 50.0, "net", "tips", True
 
     def __init__(self, length, comb):
         self.length, self.comb, self.asked = length, comb, []
