@@ -14,7 +14,7 @@ from ..errors import FoldedUVError, PrecisionError
 from ..linalg.nested_dissection import LARGE, mesh_order
 from ..linalg.sparse import Factor, solve_general
 from ..mesh.geometry import angles_from_lengths, halfedge_lengths
-from ..mesh.topology import halfedges, twins
+from ..mesh.topology import graph_components, halfedges, twins
 from .energy import Elements, energies_of, squared
 
 # Rounds at most in which weights are evened, and the share of its energy that one has to win for another one: each
@@ -197,6 +197,31 @@ def released_vertices(
         left = ~(released[i] | released[j])
         i, j = i[left], j[left]
     return released
+
+
+def arcs_of_parts(triangles: np.ndarray, loop: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Parts (k,) of a disk mesh (m,3) that one inner edge each cuts off from the rest, its boundary loop (b,) on a
+    circle: the least shares of the circle that they take, and their shares of the area (m,) of the triangles.
+
+    A part with the share a of a disk lies between its edge and an arc of at least the angle t with t - sin t = 2 pi a,
+    which is greater than (12 pi a)^(1/3): small parts take far more of the circle than of the area.
+    """
+    on_loop = np.zeros(int(triangles.max()) + 1, bool)
+    on_loop[loop] = True
+    (tail, head), other = halfedges(triangles), twins(triangles)
+    across = on_loop[tail] & on_loop[head]
+    inner, cut = np.flatnonzero((other >= 0) & ~across), np.flatnonzero((other >= 0) & across)
+    count, part = graph_components(inner // 3, other[inner] // 3, len(triangles))
+    share = np.bincount(part, area, count) / area.sum()
+    # What hangs together without the largest hangs on it by one edge.
+    rest = share.argmax()
+    one, side = part[cut // 3], part[other[cut] // 3]
+    apart = (one != rest) & (side != rest)
+    number, hanging = graph_components(one[apart], side[apart], count)
+    share[rest] = 0
+    share = np.bincount(hanging, share, number)
+    share = share[share > 0]
+    return np.cbrt(12 * np.pi * share) / (2 * np.pi), share
 
 
 def _weights(positions: np.ndarray, triangles: np.ndarray, equal: bool = False) -> csr_matrix:

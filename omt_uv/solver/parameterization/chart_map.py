@@ -15,6 +15,7 @@ from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, Transpo
 from ..freed_memory import give_back_of
 from ..maps.contacts import touches_itself
 from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
+from ..maps.tutte import arcs_of_parts
 from ..mesh.charts import Chart
 from ..mesh.geometry import bounding_box, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_areas
@@ -56,6 +57,7 @@ VANISHED = 50.0
 UNROLLED = 1e-4
 # Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
 NO_ROOM = 1e-7
+PARTED = "parts that single edges cut off take more than all of a circle"
 # What is said, after their number, of faces of a map that is returned all the same.
 FOLDED = "faces are folded or without area in the map"
 
@@ -305,6 +307,11 @@ def _disk_mesh(
         text = f"A chart with only three boundary vertices does not fill a {boundary}; its boundary is free"
         log.warnings.append(text)
         boundary = "free"
+    if boundary != "free" and options.kind == "authalic" and options.balance == 0:
+        arcs, _ = arcs_of_parts(disk.triangles, loop, area)
+        if arcs.sum() > 1:
+            log.warnings.append(f"The {boundary} has no room for this chart ({PARTED}); its boundary is free instead")
+            boundary = "free"
     corners, aspect = None, 1.0
     if boundary in RECTANGLES:
         from ..canonical.rectangles import natural_aspect, rectangle_corners

@@ -28,7 +28,7 @@ from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES, SQUEEZED, UNSQUEEZED, is_squeezed
-from ..refinement.initial_maps import is_far
+from ..refinement.initial_maps import is_crowded, is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed_uv
@@ -46,13 +46,11 @@ COARSE_MAP = (0.3, 0.2)
 COARSE_REFINEMENT = (0.5, 0.3)
 RETURN = (0.8, 0.1)
 SMOOTHING = (0.9, 0.1)
-# Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
-# distance counts squared.
+# Sites closer than this share of the domain are lost on the paraboloid, where their distance counts squared.
 SITE_RESOLUTION = 1e-7
 # Charts with more vertices than this come by way of a coarser one.
 COARSE_ABOVE = 5000
-# Up to so many come without one where their boundary is free and what they are flattened or evened to has room: that
-# leaves as little to do, and shears less in the end.
+# Up to so many come without where their boundary is free and what they start from has room: that shears less.
 DIRECT_WITH_ROOM = 9000
 # Charts of at most so many vertices start from a mean value map where others start from an evened one: steps take
 # little time there, and searches for seams foretell the shear of a map by that of coarse surfaces with such a start.
@@ -72,7 +70,7 @@ LITTLE_SPREAD = 0.5
 # Mean energy of a mean value map above which a large chart starts from a flat one: where slivers make it so bad,
 # coarser meshes say nothing, and the way from it is long.
 HOPELESS = 50.0
-# Energy below which a map is an isometry, but for rounding, and nothing is left to refine.
+# Energy below which a map is an isometry, but for rounding.
 ISOMETRY = 1e-8
 # What is unrolled so that its outline lies on itself may be that far from one: shear of 1.02 to 1.1.
 UNROLLED = 1e-2
@@ -351,7 +349,9 @@ def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
         return None
     faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
     with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
-        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, SQUEEZED, lambda: True)
+        # A transport within a circle that vertices are going to leave is no better start.
+        left = disk.boundary == "disk" and is_crowded(disk.triangles, disk.loop, disk.target)
+        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, np.inf if left else SQUEEZED, lambda: True)
         return None if evened is None else InitialChartMap(evened)
     return None
 

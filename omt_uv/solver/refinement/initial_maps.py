@@ -17,7 +17,7 @@ from ..linalg.sparse import Factor
 from ..maps.contacts import covers_itself
 from ..maps.development import developed
 from ..maps.energy import elements
-from ..maps.tutte import NO_QUADS, arc_length_parameters, released_vertices, tutte
+from ..maps.tutte import NO_QUADS, arc_length_parameters, arcs_of_parts, released_vertices, tutte
 from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
 from ..mesh.geometry import dot3, face_areas, lengths, signed_areas
 from ..mesh.topology import expand
@@ -38,6 +38,9 @@ EXACT = 1e-10
 POLISH = 3
 # A boundary vertex this near to being the farthest of all is as good as that.
 FARTHEST = 1 - 1e-6
+# What parts of a disk that one edge each cuts off may take of the circle beyond their shares of the area: more of it
+# shears the rest, too.
+CROWDED = 0.2
 # Mean energy of a start above which another one may be better.
 RELAXED = 2.0
 # A target is far from the areas of a surface where its relative entropy is more than this. A twentieth of the surface
@@ -86,6 +89,13 @@ def disk_initial_map(vertices, triangles, uv, loop) -> InitialMap:
             return InitialMap(_straighten(uv, vertices, triangles, loop, places, warnings), motion, tuple(warnings))
     warnings, places = [SPREAD], arc_length_boundary(vertices, loop, radius)
     return InitialMap(_straighten(uv, vertices, triangles, loop, places, warnings), motion, tuple(warnings))
+
+
+def is_crowded(triangles: np.ndarray, loop: np.ndarray, area: np.ndarray) -> bool:
+    """Whether parts that one edge each cuts off leave the rest of a disk (m,3) too little of its circle, with the loop
+    (b,) upon it, for triangles of these areas (m,)."""
+    arcs, shares = arcs_of_parts(triangles, loop, area)
+    return float(np.maximum(arcs - shares, 0).sum()) > CROWDED
 
 
 def notched_disk(start: InitialMap, triangles, loop) -> InitialMap | None:

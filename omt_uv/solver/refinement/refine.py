@@ -31,6 +31,7 @@ from .initial_maps import (
     InitialMap,
     disk_initial_map,
     free_initial_map,
+    is_crowded,
     is_far,
     notched_disk,
     rectangle_initial_map,
@@ -231,6 +232,7 @@ def _refined(
     faces = make()
     by_triangle = triangle_by_triangle(faces)
     initial, w = _start(mesh, faces, boundary, loop)
+    initial, notches = _with_notches(initial, mesh, by_triangle, loop, options)
     smoother = _smoother(mesh, faces, balance)
     warm = options.warm_start
     known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
@@ -264,7 +266,7 @@ def _refined(
     found = yield from part_of(way, *STAGES)
     faces = half if symmetry is None else make()
     error = area_error(faces, found.w)
-    if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
+    if notches and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(initial, mesh.triangles, loop)
         if notched is not None:
             again = _map_problem(half, assembly, notched, loop, boundary, smoother)
@@ -286,6 +288,19 @@ def _start(mesh: Renumbered, faces: Elements, boundary: str, loop: np.ndarray) -
     initial = INITIAL_MAPS[boundary](*given, **_start_options(boundary, faces, far))
     w = initial.uv @ [1, 1j]
     return initial if boundary == "disk" else replace(initial, uv=np.zeros((0, 2))), w
+
+
+def _with_notches(
+    initial: InitialMap, mesh: Renumbered, by_triangle: Elements, loop: np.ndarray, options: RefinementOptions
+) -> tuple[InitialMap, bool]:
+    """How the boundary of a disk may move where single edges cut off too much of it, and whether notches may be of use
+    later, if not."""
+    if options.boundary != "disk" or options.balance > 0:
+        return initial, False
+    if not is_crowded(mesh.triangles, loop, by_triangle.area * by_triangle.ratio):
+        return initial, True
+    notched = notched_disk(initial, mesh.triangles, loop)
+    return initial if notched is None else notched, False
 
 
 def _smoother(mesh: Renumbered, faces: Elements, balance: float) -> Smoother | None:

@@ -6,7 +6,7 @@ import pytest
 
 from omt_uv.solver.maps import tutte as module
 from omt_uv.solver.maps.energy import area_error, elements, energy
-from omt_uv.solver.maps.tutte import arc_length_parameters, evened_tutte, mean_value_weights, tutte
+from omt_uv.solver.maps.tutte import arc_length_parameters, arcs_of_parts, evened_tutte, mean_value_weights, tutte
 from omt_uv.solver.mesh.geometry import face_areas, halfedge_lengths, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 
@@ -132,3 +132,38 @@ def test_sides_without_length_have_room_on_a_convex_boundary():
     step = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1)
     assert step.min() > 1e-5 * step.mean()
     assert (signed_areas(tutte(V, F, loop, places, equal=True), F) > 0).all()
+
+
+def with_ears(V, F, ears):
+    """A disk mesh with triangles (ears,) glued to boundary edges far from each other."""
+    loop = boundary_loops(F)[0]
+    at = np.arange(ears) * (len(loop) // max(ears, 1))
+    tail, head = loop[at], loop[(at + 1) % len(loop)]
+    tip = (V[tail] + V[head]) / 2 + [0, 0, 0.2]
+    return np.vstack([V, tip]), np.vstack([F, np.column_stack([head, tail, len(V) + np.arange(ears)])])
+
+
+@pytest.mark.parametrize("ears", [0, 1, 5])
+def test_parts_behind_single_edges_take_more_of_a_circle_than_of_the_area(ears):
+    V, F = with_ears(*meshes.grid(), ears)
+    area = np.ones(len(F))
+    arcs, shares = arcs_of_parts(F, boundary_loops(F)[0], area)
+    # Corners of a grid, too, are triangles behind one edge.
+    assert len(shares) >= ears
+    np.testing.assert_allclose(shares, 1 / len(F))
+    angle = 2 * np.pi * arcs
+    assert (angle - np.sin(angle) <= 2 * np.pi * shares).all() and (arcs > 5 * shares).all()
+
+
+def test_what_hangs_behind_a_part_counts_with_it():
+    V, F = with_ears(*meshes.grid(), 1)
+    ear = len(F) - 1
+    tail, tip = F[ear, 1], F[ear, 2]
+    F = np.vstack([F, [tip, tail, len(V)]])
+    area = np.ones(len(F))
+    area[-2:] = 3.0
+    _, shares = arcs_of_parts(F, boundary_loops(F)[0], area)
+    assert np.isclose(shares, 6.0 / area.sum()).sum() == 1
+    # All triangles of a fan without inner vertices are parts; what hangs on the largest has the rest.
+    _, shares = arcs_of_parts(np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]]), np.arange(5), np.array([1.0, 2.0, 1.0]))
+    np.testing.assert_allclose(shares, [0.25, 0.25])

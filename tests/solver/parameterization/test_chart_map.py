@@ -11,6 +11,7 @@ from omt_uv.solver.errors import PinError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import boundary_edges
 from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import in_unit_box, map_chart, placed_chart
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
@@ -28,6 +29,23 @@ def test_a_unit_box_holds_every_unit(scale):
     inside, extent = in_unit_box(scale * V)
     assert extent == pytest.approx(scale * np.ptp(V, axis=0).max()) and np.abs(inside).max() <= 0.5 + 1e-12
     np.testing.assert_allclose(inside, in_unit_box(V)[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("boundary", ["disk", "square"])
+@pytest.mark.parametrize(
+    "balance, kind, free", [(0.0, "authalic", True), (0.5, "authalic", False), (0.0, "polar", False)]
+)
+def test_what_no_circle_has_room_for_has_a_free_boundary(boundary, balance, kind, free):
+    """Triangles along the whole outline, each behind one edge, of which everyone takes a tenth of a circle."""
+    V, F = meshes.bumpy(8, 8)
+    edges = boundary_edges(F)
+    tips = V[edges].mean(axis=1) + [0, 0, 0.2]
+    F = np.vstack([F, np.column_stack([edges[:, ::-1], len(V) + np.arange(len(edges))])])
+    chart = chart_of(np.vstack([V, tips]), F)
+    found = drain(map_chart(chart, options=MapOptions(boundary, balance=balance, kind=kind)))
+    text = f"The {boundary} has no room for this chart (parts that single edges cut off take more than all of a circle)"
+    assert any(warning.startswith(text) for warning in found.warnings) == free
+    assert found.folds == 0 or not free
 
 
 @pytest.mark.parametrize("boundary", ["free", "disk", "square"])

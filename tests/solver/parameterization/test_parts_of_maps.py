@@ -505,6 +505,17 @@ def test_an_evened_start_is_for_meshes_of_a_middle_size_near_their_areas(most, f
     assert (None if start is None else start.uv) == found
 
 
+@pytest.mark.parametrize(
+    "boundary, crowded, most", [("disk", True, np.inf), ("disk", False, 50.0), ("square", True, 50.0)]
+)
+def test_an_evened_start_may_be_squeezed_where_vertices_will_leave_the_circle(boundary, crowded, most, monkeypatch):
+    asked = []
+    monkeypatch.setattr(initial_map, "is_crowded", lambda *_: crowded)
+    monkeypatch.setattr(initial_map, "evened_sites", lambda *words: asked.append(words[4]))
+    assert initial_map.evened_initial_map(disk_mesh(boundary, corners=np.arange(4)), RunLog()) is None
+    assert asked == [most]
+
+
 @pytest.mark.parametrize("boundary", ["free", "disk"])
 def test_drafts_and_direct_starts_are_flat_only_where_the_boundary_is_free(boundary, monkeypatch):
     disk = disk_mesh(boundary)

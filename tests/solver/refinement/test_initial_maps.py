@@ -18,6 +18,7 @@ from omt_uv.solver.refinement.initial_maps import (
     disk_initial_map,
     free_initial_map,
     inner_curvature,
+    is_crowded,
     is_curved,
     is_far,
     notched_disk,
@@ -120,6 +121,18 @@ def test_a_part_behind_one_edge_leaves_the_circle():
     V, F = MESHES["cap"]
     loop = boundary_loops(F)[0]
     assert notched_disk(disk_initial_map(V, F, V[:, :2], loop), F, loop) is None
+
+
+def test_a_circle_is_crowded_by_small_parts_and_by_no_halves():
+    V, F = meshes.grid()
+    loop, area = boundary_loops(F)[0], np.ones(len(F))
+    assert not is_crowded(F, loop, area)
+    at = np.arange(6) * (len(loop) // 6)
+    F = np.vstack([F, np.column_stack([loop[at + 1], loop[at], len(V) + np.arange(6)])])
+    assert is_crowded(F, boundary_loops(F)[0], np.ones(len(F)))
+    # Two halves that one edge joins have as much of the circle as of the area.
+    fans = np.array([[0, 1, 6], [1, 2, 6], [2, 3, 6], [3, 0, 6], [3, 2, 7], [2, 4, 7], [4, 5, 7], [5, 3, 7]])
+    assert not is_crowded(fans, boundary_loops(fans)[0], np.ones(8))
 
 
 def test_areas_are_far_by_their_shares_alone():

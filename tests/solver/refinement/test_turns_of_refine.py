@@ -50,6 +50,7 @@ def refined(monkeypatch):
         notched=None,
         tense=False,
         crossing_start=True,
+        crowded=False,
         **given,
     ):
         calls, errors = [], [error, *(notched or [])]
@@ -124,9 +125,10 @@ def refined(monkeypatch):
 
         def notch(initial, triangles, loop):
             calls.append("notch")
-            return SimpleNamespace(warnings=("notches",)) if notched is not None else None
+            return SimpleNamespace(warnings=("notches",), may_cross=True) if notched is not None else None
 
         monkeypatch.setattr(refinement, "notched_disk", notch)
+        monkeypatch.setattr(refinement, "is_crowded", lambda *_: crowded)
 
         def placed(w, given, faces, pins, area):
             calls.append(f"placed {0 if pins is None else len(pins.vertices)} {area is None}")
@@ -225,6 +227,14 @@ def test_tense_starts_are_smoothed_by_the_first_weight(refined):
 def test_disks_without_room_are_tried_with_notches(error, quality, balance, boundary, tried, refined):
     _, calls = refined(error=error, quality=quality, balance=balance, boundary=boundary)
     assert ("notch" in calls) == tried and len(stages(calls)) == 1
+
+
+@pytest.mark.parametrize("notched", [[0.5], None])
+def test_crowded_disks_have_notches_at_once(notched, refined):
+    found, calls = refined(error=0.5, notched=notched, boundary="disk", crowded=True)
+    assert [c[0] for c in stages(calls)] == ["notched" if notched else "plain"] and calls.count("notch") == 1
+    assert found.warnings == ("notches" if notched else "initial", "stages")
+    assert "notch" not in refined(boundary="disk", crowded=True, balance=0.5)[1]
 
 
 @pytest.mark.parametrize(("error", "better"), [(0.49, True), (0.5, False), (0.51, False)])
