@@ -40,7 +40,7 @@ POLISH = 3
 FARTHEST = 1 - 1e-6
 # What parts of a disk that one edge each cuts off may take of the circle beyond their shares of the area: more of it
 # shears the rest, too.
-CROWDED = 0.2
+CROWDED = 0.125
 # Mean energy of a start above which another one may be better.
 RELAXED = 2.0
 # A target is far from the areas of a surface where its relative entropy is more than this. A twentieth of the surface
