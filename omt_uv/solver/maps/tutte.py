@@ -52,15 +52,18 @@ def tutte(
     equal: bool = False,
     order: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2); equal: with
-    the weights of equilateral triangles in place of the mesh's own; order (n,): see `nested_dissection.mesh_order`."""
+    """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2).
+
+    boundary (b,2k) : several give as many side by side, (n,2k); equal : with the weights of equilateral triangles in
+    place of the mesh's own; order (n,) : see `nested_dissection.mesh_order`
+    """
     n = len(positions)
     inside = np.ones(n, dtype=bool)
     inside[loop] = False
     if order is None and n >= LARGE:
         order = mesh_order(positions, triangles)
     inner = np.flatnonzero(inside) if order is None else order[inside[order]]
-    uv = np.zeros((n, 2))
+    uv = np.zeros((n, boundary.shape[1]))
     uv[loop] = boundary
     if len(inner):
         rows = _weights(positions, triangles, equal)[inner]
@@ -183,10 +186,11 @@ def released_vertices(
     tail, head = halfedges(triangles)
     inner = (twins(triangles) >= 0) & (tail < head)
     ends = np.concatenate([np.column_stack([tail[inner], head[inner]]), quads[:, ::2], quads[:, 1::2]])
+    ends = ends[(position[ends] >= 0).all(axis=1)]
     i, j = (position[np.unique(np.sort(ends, axis=1), axis=0)]).T
     # A corner belongs to the side it starts and to the one before.
     sides = np.stack([side, np.where(corner, (side - 1) % 4, side)])
-    same = (i >= 0) & (j >= 0) & (sides[:, None, i] == sides[None, :, j]).any((0, 1))
+    same = (sides[:, None, i] == sides[None, :, j]).any((0, 1))
     i, j = i[same], j[same]
     released = np.zeros(len(loop), bool)
     while len(i):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.density import relative_entropy
-from ..errors import FoldedUVError
+from ..errors import FoldedUVError, PrecisionError
 from ..linalg.sparse import Factor
 from ..maps.contacts import covers_itself
 from ..maps.development import developed
@@ -50,6 +50,8 @@ FAR = 0.5
 BEYOND_REPAIR = 0.05
 # The same of an outline that is no outline.
 USELESS = 1e-3
+# Turns of a square's corners, of eight, that are tried with the vertices off its sides that have no room there.
+BEST = 2
 
 
 @dataclass(frozen=True)
@@ -178,11 +180,29 @@ def _rectangle_map(vertices, triangles, uv, loop, shape: np.ndarray, quads: np.n
     if not tries or tries[0][1] > USABLE:
         even = 4 * arc_length_parameters(vertices, loop)
         reasons = [SQUEEZED if ordered else SPREAD]
-        tries += [_attempt(mesh, (even + k / 8) % 4, half, reasons) for k in range(8)]
+        tries += _attempts(mesh, [(even + k / 8) % 4 for k in range(8)], half, reasons)
     best, _ = min(tries, key=lambda found: found[1])
     if isinstance(best, FoldedUVError):
         raise best
     return best
+
+
+def _attempts(mesh, several, half, reasons) -> list[tuple[InitialMap | FoldedUVError, float]]:
+    """Those of the starts with these positions (b,) along the square that are the best two by embeddings with the whole
+    loop upon it, which have one matrix; all of them where these tell nothing."""
+    vertices, triangles, uv, loop, _ = mesh
+    places = [_on_square(_snap_corners(s)[0]) * half for s in several]
+    inside = ~np.isin(triangles, loop).all(axis=1)
+    try:
+        embedded = tutte(uv, triangles, loop, np.concatenate(places, axis=1))
+        values = [map_energy(embedded[:, 2 * k : 2 * k + 2], vertices, triangles[inside]) for k in range(len(several))]
+    except PrecisionError:
+        values = []
+    best = [k for k in np.argsort(values)[:BEST] if np.isfinite(values[k])]
+    found = [_attempt(mesh, several[k], half, reasons) for k in best]
+    if not any(np.isfinite(energy) for _, energy in found):
+        found = [_attempt(mesh, s, half, reasons) for s in several]
+    return found
 
 
 def _attempt(mesh, s, half, reasons) -> tuple[InitialMap | FoldedUVError, float]:

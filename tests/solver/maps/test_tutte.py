@@ -143,6 +143,15 @@ def with_ears(V, F, ears):
     return np.vstack([V, tip]), np.vstack([F, np.column_stack([head, tail, len(V) + np.arange(ears)])])
 
 
+def test_several_boundaries_at_once_are_those_one_by_one():
+    V, F = meshes.bumpy()
+    loop = boundary_loops(F)[0]
+    first = circle(V, loop)
+    both = tutte(V, F, loop, np.concatenate([first, 2 * first[:, ::-1]], axis=1))
+    np.testing.assert_allclose(both[:, :2], tutte(V, F, loop, first), atol=1e-12)
+    np.testing.assert_allclose(both[:, 2:], 2 * both[:, 1::-1], atol=1e-12)
+
+
 @pytest.mark.parametrize("ears", [0, 1, 5])
 def test_parts_behind_single_edges_take_more_of_a_circle_than_of_the_area(ears):
     V, F = with_ears(*meshes.grid(), ears)

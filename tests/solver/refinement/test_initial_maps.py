@@ -8,10 +8,11 @@ import pytest
 from omt_uv.solver.cutting import cut_to_disks
 from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.maps.polygon_elements import polygon_mesh
-from omt_uv.solver.maps.tutte import tutte
+from omt_uv.solver.maps.tutte import NO_QUADS, arc_length_parameters, tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary, count_folds
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.refinement import initial_maps
 from omt_uv.solver.refinement.initial_maps import (
     NEARLY_FLAT,
     check_initial_map,
@@ -151,3 +152,17 @@ def test_maps_that_no_refinement_can_start_from_are_refused():
             check_initial_map(wrong, F)
     with pytest.raises(FoldedUVError, match="repair"):
         check_initial_map(np.abs(V[:, :2] - 0.5), F)
+
+
+@pytest.mark.parametrize("failing", [False, True])
+def test_turns_of_a_square_are_told_by_one_system(failing, monkeypatch):
+    """The best of eight, or, where embeddings tell nothing, all of them tried."""
+    V, F = meshes.bumpy(12, 12)
+    loop = boundary_loops(F)[0]
+    half, even = np.ones(2) / 2, 4 * arc_length_parameters(V, loop)
+    mesh, several = (V, F, V[:, :2] * [2, 0.5], loop, NO_QUADS), [(even + k / 8) % 4 for k in range(8)]
+    every = [initial_maps._attempt(mesh, s, half, [])[1] for s in several]
+    if failing:
+        monkeypatch.setattr(initial_maps, "map_energy", lambda uv, V, F: np.inf)
+    found = [energy for _, energy in initial_maps._attempts(mesh, several, half, [])]
+    assert len(found) == (8 if failing else 2) and (failing or min(found) == min(every))
