@@ -29,9 +29,10 @@ def evened_sites(
     area_weight: float,
     most: float,
     patient: Callable[[], bool] = lambda: False,
+    order: np.ndarray | None = None,
 ) -> np.ndarray | None:
     """An embedding (n,2) of a disk mesh (n,3) that gives every triangle room, by weights that are evened; None where
-    its energy at this area weight does not come down to `most`. patient : see `tutte.evened_tutte`.
+    its energy at this area weight does not come down to `most`. patient, order : see `tutte.evened_tutte`.
 
     outline : the boundary (b,), corners (4,) or None, and the domain. A face with three vertices on one side of a
         rectangle has no area: one of these leaves the side.
@@ -47,7 +48,7 @@ def evened_sites(
         corner = np.isin(loop, corners)
         kept = ~released_vertices(faces.triangles, loop, np.cumsum(corner) - 1, corner, len(vertices))
         loop, places = loop[kept], places[kept]
-    order = mesh_order(vertices, faces.triangles)
+    order = mesh_order(vertices, faces.triangles) if order is None else order
     sites = tutte(vertices, faces.triangles, loop, places, order=order)
     return evened_tutte(vertices, loop, sites, faces, area_weight, most, order, patient)
 

@@ -89,8 +89,13 @@ class HarmonicSystem:
         uv = np.zeros((self.laplacian.shape[0], 2))
         uv[self.loop] = boundary
         if self.factor is not None:
-            uv[self.inner] = self.factor.solve(-(self.laplacian[self.inner][:, self.loop] @ boundary))
+            uv[self.inner] = self.factor.solve(-(self.outside @ boundary))
         return uv
+
+    @cached_property
+    def outside(self) -> csr_matrix:
+        """What the laplacian makes of the boundary inside, (i,b)."""
+        return self.laplacian[self.inner][:, self.loop]
 
     @property
     def even_turn(self) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csc_matrix, csr_matrix, diags
 
 from ..errors import FoldedUVError, PrecisionError
 from ..linalg.nested_dissection import LARGE, mesh_order
@@ -100,7 +100,7 @@ def evened_tutte(
     order = mesh_order(positions, triangles) if order is None else order
     inner = order[~np.isin(order, loop)]
     rows = _weights(positions, triangles)[inner]
-    inside, outside = rows[:, inner], rows[:, loop]
+    means = _Means(rows[:, inner], rows[:, loop])
     best, least, uv = uv, np.inf, uv.copy()
     for k in range(ROUNDS):
         a, b = faces.derivatives(uv @ [1, 1j])
@@ -114,10 +114,10 @@ def evened_tutte(
         kept = 1 / np.sqrt(_stretch(faces, a, b, n))
         if k:
             kept = np.sqrt(kept * np.sqrt(_growth(faces, a, b, n)))
-        for part, columns in ((inside, inner), (outside, loop)):
+        for part, columns in ((means.inside, inner), (means.outside, loop)):
             part.data *= kept[columns][part.indices]
         try:
-            uv[inner] = _weighted(inside, outside, uv[loop])
+            uv[inner] = means.of(uv[loop])
         except PrecisionError:
             break
     return best if least <= most else None
@@ -131,16 +131,26 @@ def _goes_on(k: int, value: float, before: float, most: float, patient: Callable
     return comes_down and (won < 1 - WORTHWHILE or (value > most and won < 1 - WELCOME and patient()))
 
 
-def _weighted(inside: csr_matrix, outside: csr_matrix, boundary: np.ndarray) -> np.ndarray:
-    """Vertices (k,2), each the mean of its neighbours by the weights (k,k) of those inside and (k,b) of a boundary
-    (b,2). Raises PrecisionError."""
-    total = 1 / (_row_sums(inside) + _row_sums(outside))
-    matrix = diags(np.ones(len(total))) - diags(total) @ inside
-    return Factor(matrix.tocsc(), "natural", spd=False).solve(total[:, None] * (outside @ boundary))
+class _Means:
+    """Vertices each of which is the mean of its neighbours, by weights (k,k) of those inside and (k,b) of a boundary:
+    their values may change from one time to the next."""
 
+    def __init__(self, inside: csr_matrix, outside: csr_matrix):
+        inside.sort_indices()
+        self.inside, self.outside, count = inside, outside, inside.shape[0]
+        self._row = np.repeat(np.arange(count), np.diff(inside.indptr))
+        # Where each entry, and each of the diagonal, is by columns.
+        number = csr_matrix((np.arange(1.0, inside.nnz + 1), inside.indices, inside.indptr), inside.shape)
+        self._pattern = csc_matrix(number + diags(np.arange(inside.nnz + 1.0, inside.nnz + count + 1)))
+        self._place = self._pattern.data.astype(np.int64) - 1
 
-def _row_sums(matrix: csr_matrix) -> np.ndarray:
-    return matrix @ np.ones(matrix.shape[1])
+    def of(self, boundary: np.ndarray) -> np.ndarray:
+        """The places (k,2) of the vertices inside a boundary (b,2). Raises PrecisionError."""
+        inside, outside, pattern = self.inside, self.outside, self._pattern
+        total = 1 / (inside @ np.ones(inside.shape[1]) + outside @ np.ones(outside.shape[1]))
+        values = np.concatenate([-inside.data * total[self._row], np.ones(len(total))])[self._place]
+        matrix = csc_matrix((values, pattern.indices, pattern.indptr), shape=pattern.shape)
+        return Factor(matrix, "natural", spd=False).solve(total[:, None] * (outside @ boundary))
 
 
 def _stretch(faces: Elements, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray:

@@ -140,20 +140,13 @@ def map_chart(
     initial = yield from part_of(_initial_map(disk, options.balance, log, draft, goal), *INITIAL)
     with log.timed("refinement"):
         start, places = mirrored_to_pins(initial.uv, pins)
-        refinement_options = RefinementOptions(
-            boundary=disk.boundary,
-            balance=options.balance,
-            quality=options.quality,
-            warm_start=initial.warm and places is None,
-            prolonged=initial.prolonged and places is None,
-            multiplier=initial.multiplier,
-        )
         asked = None if target is None else disk.target
         given = {"target": asked, "region": disk.region, "pins": places, "polygons": disk.polygons}
         refined = good_enough(disk, start, draft, initial.apart, goal) if plain else None
         if refined is None:
+            again = _refinement_options(disk, options, initial, places is None)
             disk = replace(disk)  # without the maps that were made of it on the way
-            refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
+            refined = yield from part_of(_refined(disk, start, again, given, log), *REFINEMENT)
         refined = replace(refined, uv=refined.uv[: len(vertices)])  # centres of polygons were there for the map alone
     with log.timed("measure"):
         figures = measured_chart(vertices, chart, refined.uv, density)
@@ -165,6 +158,19 @@ def map_chart(
         uv = placed_chart(uv, vertices, chart, density, unit, pins, disk.boundary == "free")
         uv = _turned(uv, disk, markers, pins, log)
     return _chart_map(uv, initial, refined, figures, log, pins is not None)
+
+
+def _refinement_options(disk: DiskMesh, options: MapOptions, start: InitialChartMap, loose: bool) -> RefinementOptions:
+    """How the map of a disk is refined from a start; loose: without pins."""
+    return RefinementOptions(
+        boundary=disk.boundary,
+        balance=options.balance,
+        quality=options.quality,
+        warm_start=start.warm and loose,
+        prolonged=start.prolonged and loose,
+        multiplier=start.multiplier,
+        order=disk.order,
+    )
 
 
 def _refuse_pins(pins: ChartPins | None, options: MapOptions) -> None:

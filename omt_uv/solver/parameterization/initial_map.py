@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from ..conformal.disk_map import ConformalMap
     from ..transport.semidiscrete import Transport
 
-# Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
+# Where the time of a chart goes, roughly, as start and width.
 CONFORMAL = (0.0, 0.4)
 TRANSPORT = (0.4, 0.6)
 COARSENING = (0.0, 0.3)
@@ -48,7 +48,7 @@ RETURN = (0.8, 0.1)
 SMOOTHING = (0.9, 0.1)
 # Sites closer than this share of the domain are lost on the paraboloid, where their distance counts squared.
 SITE_RESOLUTION = 1e-7
-# Charts with more vertices than this come by way of a coarser one.
+# Charts with more vertices come by way of a coarser one.
 COARSE_ABOVE = 5000
 # Up to so many come without where their boundary is free and what they start from has room: that shears less.
 DIRECT_WITH_ROOM = 9000
@@ -64,8 +64,7 @@ COARSE_ENOUGH = 0.25
 COARSER_FAR = 5
 COARSE_ENOUGH_FAR = 0.4
 DIRECT_FAR = 20000
-# A disk whose log scale spreads less than this over the surface, flattened with the boundary as it comes, is as near to
-# the map looked for as the transport would bring it.
+# A disk whose log scale spreads less is as near, flattened with the boundary as it comes, as the transport brings it.
 LITTLE_SPREAD = 0.5
 # Mean energy of a mean value map above which a large chart starts from a flat one: where slivers make it so bad,
 # coarser meshes say nothing, and the way from it is long.
@@ -269,7 +268,7 @@ def _coarse_initial_map(
         sweeps, enough = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
         smooth = smoothed_uv(vertices, triangles, disk.target, uv, weight, sweeps, enough)
         uv = yield from part_of(smooth, *SMOOTHING)
-        # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
+        # Of slivers a coarser mesh says nothing: none of their vertices can go without others turning inside out.
         start = None if far or draft else flat
         if start is not None and map_energy(start, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(start)
@@ -293,12 +292,13 @@ def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, qu
         warm_start=initial.warm,
         prolonged=initial.prolonged,
         multiplier=initial.multiplier,
+        order=disk.order,
     )
     return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)
 
 
 def _draft_start(disk: DiskMesh, flat: np.ndarray, log: RunLog) -> InitialChartMap:
-    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2). What a transport spares takes less."""
+    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2)."""
     even = flat_initial_map(disk, log) if disk.boundary == "free" else None
     return InitialChartMap(flat) if even is None else even
 
@@ -350,8 +350,8 @@ def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
     faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
     with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
         # A transport within a circle that vertices are going to leave is no better start.
-        left = disk.boundary == "disk" and is_crowded(disk.triangles, disk.loop, disk.target)
-        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, np.inf if left else SQUEEZED, lambda: True)
+        most = np.inf if disk.boundary == "disk" and is_crowded(disk.triangles, disk.loop, disk.target) else SQUEEZED
+        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, most, lambda: True, disk.order)
         return None if evened is None else InitialChartMap(evened)
     return None
 

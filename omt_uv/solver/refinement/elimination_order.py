@@ -48,11 +48,17 @@ class Renumbered:
 
 
 def renumbered(
-    vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None, polygons: np.ndarray | None = None
+    vertices,
+    triangles,
+    uv,
+    pins: tuple[np.ndarray, np.ndarray] | None,
+    polygons: np.ndarray | None = None,
+    order: np.ndarray | None = None,
 ) -> Renumbered:
     """Renumber a mesh (n,3), (m,3), its map (n,2), and pins: vertices (k,) and their places (k,2).
 
-    polygons (m,): of every triangle; all corners of a quad are neighbours.
+    polygons (m,): of every triangle; all corners of a quad are neighbours; order (n,): where it is known, which
+    counts where triangles are polygons of their own.
 
     Raises
     ------
@@ -61,8 +67,10 @@ def renumbered(
     uv = np.asarray(uv, float)
     check_initial_map(uv, triangles)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    joined = triangles if polygons is None else polygon_mesh(triangles, polygons).every_triangle()
-    order = mesh_order(vertices, joined)
+    if polygons is not None and np.bincount(polygons).max(initial=0) > 1:
+        order = mesh_order(vertices, polygon_mesh(triangles, polygons).every_triangle())
+    elif order is None:
+        order = mesh_order(vertices, triangles)
     # What is kept of the mesh takes half of the memory that it came in.
     place = np.empty(len(order), np.int32)
     place[order] = np.arange(len(order))

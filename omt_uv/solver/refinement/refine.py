@@ -7,7 +7,7 @@ growing area weight (`continuation`). The weight ends where the area error is sm
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -81,6 +81,8 @@ class RefinementOptions:
     prolonged : it comes from a coarser mesh, see `continuation_rules.is_ahead`
     multiplier : of a coarser mesh, see `Refinement`
     crossing : a free boundary may come to cross itself, which shears less
+    order (n,) : in which vertices are eliminated, where it is known, see `nested_dissection.mesh_order`;
+        polygons of several triangles have one of their own
 
     Raises
     ------
@@ -94,6 +96,7 @@ class RefinementOptions:
     prolonged: bool = False
     multiplier: float = 0.0
     crossing: bool = False
+    order: np.ndarray | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self):
         if self.boundary not in BOUNDARIES:
@@ -172,7 +175,7 @@ def refine(
     yield Progress("Refinement", 0.0)
     give_back_of(len(vertices))
     target = _targets(face_areas(vertices, triangles), target)
-    mesh = renumbered(vertices, triangles, uv, pins, polygons)
+    mesh = renumbered(vertices, triangles, uv, pins, polygons, options.order)
 
     def make() -> Elements:
         return polygon_elements(mesh.vertices, mesh.triangles, target, polygons, region)
