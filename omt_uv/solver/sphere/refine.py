@@ -20,6 +20,7 @@ from ..progress import Progress, Steps, part_of
 from ..refinement.continuation import StageLimits, minimise
 from ..refinement.continuation_rules import (
     LOOSE,
+    PROMISED,
     QUALITIES,
     SQUEEZED_WEIGHT,
     STAGE_STEPS,
@@ -201,8 +202,11 @@ def _in_order(positions: np.ndarray, order: np.ndarray) -> np.ndarray:
 def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Quality) -> Steps[SphereRefinement]:
     """Newton in stages of growing area weight, as `refinement.continuation.minimise_in_stages`."""
     weights = planned_weights(balance, settings)
-    if is_squeezed(with_projected_targets(problem, p, weights[0]).energy(p), weights[0]):
+    squeezed = is_squeezed(with_projected_targets(problem, p, weights[0]).energy(p), weights[0])
+    if squeezed:
         weights = [SQUEEZED_WEIGHT, *weights]
+    # Exact maps, and those on the way to others, go as far as they promise; what is squeezed has far to go.
+    brisk = balance == 0 and settings.area_error <= PROMISED and settings.tolerance >= LOOSE and not squeezed
     steps, k, error = 0, 0, np.inf
     while True:
         current = with_projected_targets(with_both_diagonals(problem, p), p, weights[k])
@@ -210,7 +214,8 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
         tolerance = TOLERANCE if balance == 0 else STRICT
-        limits = StageLimits(goal, allowed, tolerance, foreseeing=balance == 0 and np.isfinite(goal))
+        last = bool(np.isfinite(goal))
+        limits = StageLimits(goal, allowed, tolerance, foreseeing=balance == 0 and last, passing=brisk and not last)
         stage = yield from minimise(current, p, limits, k)
         p, steps, weight, k = stage.w, steps + stage.steps, weights[k], k + 1
         before, error = error, problem.area_error(p)

@@ -55,9 +55,19 @@ def test_stages_have_the_planned_weights_and_limits(staged):
     found, asked = staged([("converged", 3, 0.5, 0.5), ("converged", 4, 0.01, 0.0)])
     assert [a[0] for a in asked] == [30, 500] and [a[2] for a in asked] == [0, 1]
     assert [a[1].area_error for a in asked] == [np.inf, 0.01] and [a[1].max_steps for a in asked] == [40, 40]
-    assert [a[1].foreseeing for a in asked] == [False, True]
+    assert [a[1].foreseeing for a in asked] == [False, True] and [a[1].passing for a in asked] == [True, False]
     assert (found.iterations, found.area_weight, found.area_error, found.energy) == (7, 500, 0.01, 7.0)
     assert (found.status, found.residual, found.untangling) == ("converged", 0.5, 0) and found.positions[0, 0] == 2
+
+
+@pytest.mark.parametrize(
+    "quality, energy, passing",
+    [("standard", 1.0, True), ("standard", 51.0, False), ("exact", 1.0, False), ("draft", 1.0, False)],
+)
+def test_stages_on_the_way_pass_where_areas_need_not_be_exact(quality, energy, passing, staged):
+    ends = [("converged", 1, 0.5, 0.5)] * 3 + [("converged", 1, 0.0, 0.0)] * 3
+    _, asked = staged(ends, energy=energy, quality=QUALITIES[quality])
+    assert any(a[1].passing for a in asked) == passing and not asked[-1][1].passing
 
 
 def test_what_is_squeezed_is_relaxed_first(staged):
