@@ -8,7 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import angles_from_lengths, cotangent_laplacian, face_normals, halfedge_lengths, vertex_normals
+from ..mesh.geometry import (
+    angles_from_lengths,
+    cotangent_laplacian,
+    cross3,
+    face_normals,
+    halfedge_lengths,
+    vertex_normals,
+)
 from ..mesh.topology import halfedges, on_boundary, pair_keys, pair_up
 
 
@@ -42,7 +49,7 @@ def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     first, second = pair_up(pair_keys(*halfedges(triangles)))
     normal = face_normals(positions, triangles)
     a, b = normal[first // 3], normal[second // 3]
-    angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+    angle = np.arctan2(np.linalg.norm(cross3(a, b), axis=1), (a * b).sum(axis=1))
     sharpest = np.zeros(len(positions))
     for ends in halfedges(triangles):
         np.maximum.at(sharpest, ends[first], angle)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import dot3, face_areas, face_normals, halfedge_lengths, lengths
+from ..mesh.geometry import cross3, dot3, face_areas, face_normals, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
@@ -19,7 +19,7 @@ def sharp_edges(positions: np.ndarray, triangles: np.ndarray, angle: float) -> n
     first, second, edges = _pairs(triangles)
     normal = face_normals(positions, triangles)
     a, b = normal[first // 3], normal[second // 3]
-    turn = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ej,ej->e", a, b))
+    turn = np.arctan2(np.linalg.norm(cross3(a, b), axis=1), np.einsum("ej,ej->e", a, b))
     return edges[turn > angle]
 
 
@@ -29,7 +29,7 @@ def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) 
     Negative where the surface is hollow, 0 beside faces without area.
     """
     p = np.take(positions, triangles, axis=0)
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal = cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     size = lengths(normal)
     normal /= np.where(size > 0, size, 1)[:, None]
     t, s = pair.T // 3

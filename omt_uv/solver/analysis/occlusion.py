@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.closest_point import spread_points
-from ..mesh.geometry import face_areas, face_normals
+from ..mesh.geometry import cross3, face_areas, face_normals
 from ..mesh.topology import graph_components, halfedges
 from .saliency import unit_size
 
@@ -108,9 +108,9 @@ def half_sphere(count: int) -> np.ndarray:
 def _frames(count: int) -> np.ndarray:
     """Orthonormal frames (count,3,3) whose third rows are spread over half of the sphere."""
     axis = half_sphere(count)
-    across = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    across = cross3(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
     across /= np.linalg.norm(across, axis=1)[:, None]
-    return np.stack([across, np.cross(axis, across), axis], axis=1).astype(np.float32)
+    return np.stack([across, cross3(axis, across), axis], axis=1).astype(np.float32)
 
 
 def _visible(seen: np.ndarray, slant: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

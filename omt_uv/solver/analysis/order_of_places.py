@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..mesh.geometry import cross3
+
 # Bits of each coordinate along a Morton curve, and the masks that spread them.
 BITS = 21
 MASKS = (0x1F00000000FFFF, 0x1F0000FF0000FF, 0x100F00F00F00F00F, 0x10C30C30C30C30C3, 0x1249249249249249)
@@ -85,7 +87,7 @@ def _axes(p: np.ndarray) -> np.ndarray | None:
     axes = axes * np.where(skew < 0, -1, 1)
     # The least lopsided one is across the others: a mirror image of the points is no pose of them.
     k = int(np.abs(skew).argmin())
-    axes[:, k] = np.cross(axes[:, (k + 1) % 3], axes[:, (k + 2) % 3])
+    axes[:, k] = cross3(axes[:, (k + 1) % 3], axes[:, (k + 2) % 3])
     return np.asarray(axes)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..mesh.geometry import unit, vertex_normals
+from ..mesh.geometry import cross3, unit, vertex_normals
 from ..mesh.topology import expand, graph_components, halfedges, pair_keys, paired
 
 # Rings of vertices beside a path in which a straighter one is looked for.
@@ -90,7 +90,7 @@ def straighten(
 def turning_angles(positions: np.ndarray, path: np.ndarray) -> np.ndarray:
     """Angles (k-2,) in [0, pi] by which a path (k,) of vertices (n,3) turns at each but its ends."""
     along = unit(np.diff(positions[path], axis=0))
-    cross = np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1)
+    cross = np.linalg.norm(cross3(along[:-1], along[1:]), axis=1)
     return np.arctan2(cross, (along[:-1] * along[1:]).sum(axis=1))
 
 

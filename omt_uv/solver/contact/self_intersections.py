@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..mesh.geometry import cross3
 from ..mesh.topology import halfedges, pair_keys, paired
 from .box_pairs import box_pairs
 
@@ -98,7 +99,7 @@ class FaceCrossings:
         near[asked] = True
         rows = np.flatnonzero(near[self.triangles].any(axis=1))
         corner, around = corner[rows], self.triangles[rows]
-        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        normal = cross3(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         length = np.linalg.norm(normal, axis=1)
         normal = normal / np.maximum(length, np.finfo(float).tiny)[:, None]
         flat = around.ravel()
@@ -138,7 +139,7 @@ def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     # Most pairs are told apart by the plane of one of the two.
     row = np.arange(len(a))
     for p, q in ((a, b), (b, a)):
-        normal = np.cross(p[row, 1] - p[row, 0], p[row, 2] - p[row, 0])
+        normal = cross3(p[row, 1] - p[row, 0], p[row, 2] - p[row, 0])
         side = np.einsum("ki,kci->kc", normal, q[row] - p[row, :1])
         row = row[(side.min(axis=1) <= 0) & (side.max(axis=1) >= 0)]
     a, b = a[row], b[row]
@@ -153,7 +154,7 @@ def _pierces(start: np.ndarray, end: np.ndarray, triangle: np.ndarray) -> np.nda
     """Whether segments from start to end (k,3) pass through triangles (k,3,3)."""
     size = np.abs(triangle - start[:, None]).max(axis=(1, 2)) + np.abs(end - start).max(axis=1)
     flat = FLAT * size**3
-    normal = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+    normal = cross3(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
     one = np.einsum("ki,ki->k", normal, start - triangle[:, 0])
     other = np.einsum("ki,ki->k", normal, end - triangle[:, 0])
     hit = ((one > flat) & (other < -flat)) | ((one < -flat) & (other > flat))
@@ -167,4 +168,4 @@ def _pierces(start: np.ndarray, end: np.ndarray, triangle: np.ndarray) -> np.nda
 
 def _volume(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     """Signed volume (k,), six times, of the tetrahedra that vectors a, b, c (k,3) span."""
-    return np.einsum("ki,ki->k", np.cross(a, b), c)
+    return np.einsum("ki,ki->k", cross3(a, b), c)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import nearest_rotations
+from ..mesh.geometry import cross3, nearest_rotations
 
 # Rounds of moving corners back behind the planes.
 ROUNDS = 60
@@ -87,10 +87,10 @@ def _planes(points: np.ndarray, one: np.ndarray, other: np.ndarray) -> tuple[np.
     a, b = points[one], points[other]
     size = np.ptp(np.concatenate([a, b], axis=1), axis=1).max(axis=1)
     sides_a, sides_b = a[:, [1, 2, 0]] - a, b[:, [1, 2, 0]] - b
-    axes = [np.cross(sides_a[:, 0], sides_a[:, 1])[:, None], np.cross(sides_b[:, 0], sides_b[:, 1])[:, None]]
-    axes.append(np.cross(sides_a[:, :, None], sides_b[:, None]).reshape(-1, 9, 3))
+    axes = [cross3(sides_a[:, 0], sides_a[:, 1])[:, None], cross3(sides_b[:, 0], sides_b[:, 1])[:, None]]
+    axes.append(cross3(sides_a[:, :, None], sides_b[:, None]).reshape(-1, 9, 3))
     # Planes across faces that lie in one plane, along their sides.
-    axes += [np.cross(axes[0], sides_a), np.cross(axes[1], sides_b)]
+    axes += [cross3(axes[0], sides_a), cross3(axes[1], sides_b)]
     axis = np.concatenate(axes, axis=1)
     length = np.linalg.norm(axis, axis=2)
     axis = axis / np.maximum(length, np.finfo(float).tiny)[:, :, None]
@@ -126,7 +126,7 @@ def _carried(before: np.ndarray, after: np.ndarray, corner: np.ndarray, normal: 
     soft = SOFT * size * np.eye(3)
     matrix = (cross + soft @ (stretch[:, None, None] * nearest_rotations(cross))) @ np.linalg.inv(square + soft)
     # A plane's normal goes by the inverse transpose, which has the direction of the cofactors.
-    turned = np.stack([np.cross(matrix[:, :, (k + 1) % 3], matrix[:, :, (k + 2) % 3]) for k in range(3)], axis=2)
+    turned = np.stack([cross3(matrix[:, :, (k + 1) % 3], matrix[:, :, (k + 2) % 3]) for k in range(3)], axis=2)
     turned = np.einsum("kij,kj->ki", turned, normal)
     length = np.linalg.norm(turned, axis=1)
     sound = length > 0

@@ -13,7 +13,7 @@ import numpy as np
 from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
 from ..maps.overlap import cover_pairs, covered_share
-from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.geometry import cross3, face_areas, signed_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
@@ -121,7 +121,7 @@ def cap_borders(component: CutComponent) -> np.ndarray:
     level = (fold <= LEVEL) | ~np.isfinite(component.cost)
     side = graph_components(joined[level, 0], joined[level, 1], count)[1]
     corners = component.positions[component.triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    normal = cross3(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     area = np.bincount(side, np.linalg.norm(normal, axis=1))
     whole = np.linalg.norm([np.bincount(side, x) for x in normal.T], axis=0)
     pair = side[joined]

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import HandleError, NonFiniteError
 from ..mesh.closest_point import spread_points
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import fibonacci_sphere
 from .handles import farthest_points
 
@@ -67,7 +68,7 @@ def mesh_domain(vertices: np.ndarray, triangles: np.ndarray, samples: int = SAMP
     HandleError : the mesh has no faces with area
     """
     corner = vertices[triangles]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal = cross3(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.linalg.norm(normal, axis=1)
     if not area.sum() > 0:
         raise HandleError("The mesh that shall hold the flow has no faces", "Choose a closed mesh")

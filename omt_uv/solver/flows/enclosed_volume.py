@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mesh.geometry import cross3
 from ..mesh.topology import graph_components, halfedges, pair_keys
 
 # Steps on the offset at most, and how many go along the same normals.
@@ -25,7 +26,7 @@ def corner_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Six times the signed volume (m,) between every triangle (m,3) of vertices (n,3) and the origin: over
     closed triangles that look outwards they sum to six times what these enclose."""
     corner = vertices[triangles]
-    return np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
+    return np.einsum("mi,mi->m", corner[:, 0], cross3(corner[:, 1], corner[:, 2]))
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def closed_parts(triangles: np.ndarray, part: np.ndarray) -> np.ndarray:
 def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Gradient (n,3) of the enclosed volume: a third of the area around each vertex, outwards."""
     p = vertices[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
+    normal = cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
     flat = triangles.ravel()
     each = np.repeat(normal, 3, axis=0)
     return np.stack([np.bincount(flat, each[:, k], len(vertices)) for k in range(3)], axis=1)

@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from ..mesh.topology import vertices_around
 from ..progress import drain
@@ -68,7 +69,7 @@ def move_vertices_onto(points: np.ndarray, triangles: np.ndarray, targets: np.nd
 def _corners_around(points: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Corners of the faces that hold the target, the one that would move least first."""
     p = points[triangles]
-    inside = (np.cross(p, np.roll(p, -1, axis=1)) @ target >= 0).all(axis=1)
+    inside = (cross3(p, np.roll(p, -1, axis=1)) @ target >= 0).all(axis=1)
     corners = np.unique(triangles[inside])
     return corners[np.argsort(-(points[corners] @ target), kind="stable")]
 
@@ -106,7 +107,7 @@ def push(points: np.ndarray, start: np.ndarray, end: np.ndarray, reach: float, l
     The flow of the stream function <axis, x> f(r), with r the distance from `end` and f a smooth step from 1 to 0: near
     `end` a rotation about the axis, everywhere free of divergence.
     """
-    axis = np.cross(start, end)
+    axis = cross3(start, end)
     sine = np.linalg.norm(axis)
     angle = np.arctan2(sine, start @ end)
     inner, outer = RIGID * angle, min(reach * angle, limit)
@@ -119,11 +120,11 @@ def push(points: np.ndarray, start: np.ndarray, end: np.ndarray, reach: float, l
 
     def velocity(x: np.ndarray) -> np.ndarray:
         cosine = np.clip(x @ end, -1, 1)
-        swirl = np.cross(end, x)
+        swirl = cross3(end, x)
         r = np.arctan2(np.linalg.norm(swirl, axis=1), cosine)
         f, slope = _smooth_step(r, inner, outer)
         bend = (x @ axis) * slope / np.maximum(np.sin(r), 1e-12)
-        return np.cross(axis, x) * f[:, None] - swirl * bend[:, None]
+        return cross3(axis, x) * f[:, None] - swirl * bend[:, None]
 
     for _ in range(PUSH_STEPS):
         x = normalized(x + step / 6 * runge_kutta_slopes(velocity, x, step))

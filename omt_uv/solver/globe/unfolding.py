@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..mesh.geometry import cross3
 from .pole_vertices import move_vertices_onto, singular_points
 from .projections import OCTAHEDRAL, check_projection, octahedral_to_plane, to_plane
 
@@ -140,7 +141,7 @@ def _pole_corners(points: np.ndarray, polygons: Polygons) -> np.ndarray:
     """Corners (c,) bool that stand for a pole inside their face: the nearest one of every triangle around a pole."""
     chosen = np.zeros(len(polygons.vertex), bool)
     p = points[polygons.vertex_triangles]
-    normal = np.cross(p, np.roll(p, -1, axis=1))
+    normal = cross3(p, np.roll(p, -1, axis=1))
     north, south = (normal[..., 2] > 0).all(axis=1), (normal[..., 2] < 0).all(axis=1)
     around = np.flatnonzero(north | south)
     chosen[polygons.triangles[around, np.abs(p[around, :, 2]).argmax(axis=1)]] = True

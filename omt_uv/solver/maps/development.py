@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from ..mesh.geometry import as_points, dot3, halfedge_lengths, lengths
+from ..mesh.geometry import as_points, cross3, dot3, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, twins
 
 # Triangles that disagree by no more than this, over the extent, lie flat together.
@@ -47,7 +47,7 @@ def _local_frames(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     base, right, left = length.T
     p = np.take(positions, triangles, axis=0)
     one, other = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    height = lengths(np.cross(one, other)) / np.maximum(base, 1e-300)
+    height = lengths(cross3(one, other)) / np.maximum(base, 1e-300)
     along = dot3(one, other) / np.maximum(base, 1e-300)
     return np.stack([np.zeros(len(base), complex), base.astype(complex), along + 1j * height], axis=1)
 

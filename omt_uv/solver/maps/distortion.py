@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from ..mesh.geometry import cross2, face_areas, lengths, part_by_part
+from ..mesh.geometry import cross2, cross3, face_areas, lengths, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quads
 from ..mesh.topology import graph_components
 from .overlap import overlap_share
@@ -291,7 +291,7 @@ def _shear_of(V, F, a, b):
     e, f = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
     base = lengths(e)
     along = np.einsum("ij,ij->i", e, f) / base
-    height = lengths(np.cross(e, f)) / base
+    height = lengths(cross3(e, f)) / base
     J0 = a / base[:, None]
     J1 = (b - J0 * along[:, None]) / height[:, None]
     # (s1 +- s2)^2 = |J|^2 +- 2 det, so neither value suffers from cancellation as the roots of J^T J would

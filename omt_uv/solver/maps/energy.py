@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import lengths
+from ..mesh.geometry import cross3, lengths
 
 # A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
 SHARE_ERROR = 2.7
@@ -148,7 +148,7 @@ def _hat_gradients(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     side = lengths(e1)
     x = np.einsum("md,md->m", e2, e1) / side
-    y = lengths(np.cross(e1, e2)) / side
+    y = lengths(cross3(e1, e2)) / side
     y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
     local = np.stack([np.zeros(len(x)), side, x + 1j * y], axis=1)
     area = 0.5 * side * y

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import face_areas, part_by_part
+from ..mesh.geometry import cross3, face_areas, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
 from .energy import AT_ONCE, Elements, Quads, elements, energies, hat_gradients
 
@@ -257,7 +257,7 @@ def _convex(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
     def convex(some):
         p = positions[some[:, BOTH]]
-        normal = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
+        normal = cross3(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
         own = normal[:, :2].sum(axis=1)
         return (np.einsum("qtd,qd->qt", normal, own) > CONVEX * (own**2).sum(axis=1)[:, None]).all(axis=1)
 

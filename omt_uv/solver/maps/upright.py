@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.charts import Chart
-from ..mesh.geometry import part_by_part, signed_areas
+from ..mesh.geometry import cross3, part_by_part, signed_areas
 from ..mesh.topology import halfedges, pair_keys, pair_up
 
 # Directions of edges, up to quarter turns, are counted in so many bins of half a degree.
@@ -205,7 +205,7 @@ def _along_ridge(islands: _Islands, area: np.ndarray, height: np.ndarray, rise: 
 def _level(up: np.ndarray, viewers: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Two level directions (k,3) each, away from the viewer and to the right, as seen from above with `up` (k,3)."""
     away = np.eye(3)[np.where(np.abs(up[:, 1]) < np.abs(up).max(axis=1), 1, 2)] if viewers is None else -viewers
-    right = np.cross(away, up)
+    right = cross3(away, up)
     size = np.linalg.norm(right, axis=1, keepdims=True)
     right /= np.where(size > 0, size, 1)
-    return np.cross(up, right), right
+    return cross3(up, right), right

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .geometry import part_by_part
+from .geometry import cross3, part_by_part
 from .polygon_areas import quads
 from .surface import Surface
 from .topology import next_halfedge, pair_keys, previous_halfedge
@@ -124,8 +124,8 @@ def _convex_and_longer(vertices: np.ndarray, quads: np.ndarray, rank: np.ndarray
     equal ones a corner of the least rank (n,) decides."""
     p = vertices[quads]
     length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
-    normal = np.cross(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
-    own = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    normal = cross3(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
+    own = cross3(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     # A triangle next to a corner that is nearly straight is a sliver: if it was given, the map has to keep it open.
     convex = (np.einsum("qkd,qd->qk", normal, own) > LEAST_CORNER * (own**2).sum(axis=1)[:, None]).all(axis=1)
     equal = np.abs(length[:, 1] - length[:, 0]) <= 1e-9 * length.max(axis=1)

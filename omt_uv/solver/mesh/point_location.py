@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .geometry import cross2
+from .geometry import cross2, cross3
 from .topology import twins
 
 # Edges that a walk crosses at most; far more than across a mesh of a million faces.
@@ -44,7 +44,7 @@ def _barycentric(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     a, b, c = (corners[:, k] - points for k in range(3))
     if points.shape[1] == 3:
         # Seen along the point itself.
-        parts = np.stack([np.einsum("ki,ki->k", points, np.cross(u, v)) for u, v in ((b, c), (c, a), (a, b))], axis=1)
+        parts = np.stack([np.einsum("ki,ki->k", points, cross3(u, v)) for u, v in ((b, c), (c, a), (a, b))], axis=1)
     else:
         parts = np.stack([cross2(b, c), cross2(c, a), cross2(a, b)], axis=1)
     total = parts.sum(axis=1, keepdims=True)

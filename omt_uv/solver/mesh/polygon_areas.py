@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import face_areas, part_by_part
+from .geometry import cross3, face_areas, part_by_part
 
 # Corners of a quad's four triangles: those of the diagonal given, then the others.
 BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
@@ -69,7 +69,7 @@ def _alignment(points: np.ndarray) -> np.ndarray:
     p = points / 2 - points[:, :1] / 2
     p /= np.maximum(np.abs(p).max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
     one, two, three = (p[:, BOTH[:, k]] for k in range(3))
-    normal = np.cross(two - one, three - one)
+    normal = cross3(two - one, three - one)
     own = normal[:, :2].sum(axis=1)
     size = np.linalg.norm(normal, axis=2) * np.linalg.norm(own, axis=1)[:, None]
     along = np.einsum("qtd,qd->qt", normal, own)
@@ -151,10 +151,10 @@ def polygon_fans(
     label, index = np.unique(of_side, return_inverse=True)
     centre = np.stack([np.bincount(index, vertices[tail, k]) for k in range(3)], axis=1) / np.bincount(index)[:, None]
     p, q, r, c = vertices[tail], vertices[head], vertices[head[after]], centre[index]
-    fan = np.cross(q - c, p - c) * -1
+    fan = cross3(q - c, p - c) * -1
     normal = np.stack([np.bincount(index, fan[:, k]) for k in range(3)], axis=1)[index]
     size = np.linalg.norm(normal, axis=1)
-    ear = np.einsum("sd,sd->s", np.cross(q - p, r - q), normal)
+    ear = np.einsum("sd,sd->s", cross3(q - p, r - q), normal)
     flat = ear < STRAIGHT * size * np.linalg.norm(q - p, axis=1) * np.linalg.norm(r - q, axis=1)
     sound[of_side[flat | (np.einsum("sd,sd->s", fan, normal) <= 0)]] = False
     kept = sound[of_side]
@@ -177,7 +177,7 @@ def _fans(positions, triangles, polygons, count: int) -> tuple[np.ndarray, np.nd
     of, tail, head = of[outline], tail[outline], head[outline]
     sides = np.bincount(of, minlength=count)
     centre = _sums(of, positions[tail], count) / np.maximum(sides, 1)[:, None]
-    double = np.cross(positions[tail] - centre[of], positions[head] - centre[of])
+    double = cross3(positions[tail] - centre[of], positions[head] - centre[of])
     normal = _sums(of, double, count)
     backward = np.bincount(of, np.einsum("ij,ij->i", double, normal[of]) < 0, count)
     return np.bincount(of, np.linalg.norm(double, axis=1) / 2, count), (sides > 2) & (backward == 0)

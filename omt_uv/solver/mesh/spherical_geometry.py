@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .geometry import cross3
+
 
 def normalized(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors (n,3) in the direction of vectors (n,3); zero stays zero."""
@@ -24,7 +26,7 @@ def triple_products(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
     Differences first: of close points they are exact, so that the sign of a tiny triangle is right.
     """
-    return np.einsum("md,md->m", a, np.cross(b - a, c - a))
+    return np.einsum("md,md->m", a, cross3(b - a, c - a))
 
 
 def triangle_areas(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from ..errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
+from .geometry import cross3
 from .gluing import Gluing, polygon_gluing
 from .topology import next_corners, pair_keys, pair_up, row_labels
 
@@ -110,7 +111,7 @@ def degenerate_triangles(
     size = np.abs(side).max(axis=(1, 2))
     # Scaling first keeps tiny and huge meshes clear of underflow and overflow.
     side = side / np.where(size > 0, size, 1)[:, None, None]
-    area = 0.5 * np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1)
+    area = 0.5 * np.linalg.norm(cross3(side[:, 1], side[:, 2]), axis=1)
     if owner is None:
         extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
     else:

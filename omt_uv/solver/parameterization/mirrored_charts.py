@@ -18,7 +18,7 @@ from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import MeshError
 from ..mesh.charts import Chart, sound_disks
-from ..mesh.geometry import edge_lengths, signed_areas
+from ..mesh.geometry import cross3, edge_lengths, signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads, partial_mirror
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
@@ -213,7 +213,7 @@ def _beginnings(a, sides_a, b, sides_b, size: float) -> tuple[np.ndarray, list[t
 
     def figures(x, sides):
         p, q = x[sides[:, 0], :3], x[sides[:, 1], :3]
-        lengths = (np.linalg.norm(v, axis=1) for v in (p, q, p - q, np.cross(p, q) / size))
+        lengths = (np.linalg.norm(v, axis=1) for v in (p, q, p - q, cross3(p, q) / size))
         return np.column_stack([*lengths]) / size
 
     mine, theirs = figures(a, sides_a), figures(b, sides_b)
@@ -235,7 +235,7 @@ def _frame(points: np.ndarray, sign: float = 1.0) -> np.ndarray:
         first = points[0] / np.linalg.norm(points[0])
         second = points[1] - (points[1] @ first) * first
         second = second / np.linalg.norm(second)
-    return np.column_stack([first, second, sign * np.cross(first, second)])
+    return np.column_stack([first, second, sign * cross3(first, second)])
 
 
 def with_mirrored_quads(surface: Surface, charts: Sequence[Chart]) -> list[Chart]:

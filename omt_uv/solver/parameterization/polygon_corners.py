@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.polygon_elements import OPEN
-from ..mesh.geometry import part_by_part
+from ..mesh.geometry import cross3, part_by_part
 from ..mesh.surface import Surface
 
 # A corner counts where it has this share of its polygon's area on the surface.
@@ -140,7 +140,7 @@ def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray
         return (p / 2 - q / 2) / unit
 
     def doubled(corner, first):
-        return np.cross(between(corner[:, 0], first), between(corner[:, 1], corner[:, 0]))
+        return cross3(between(corner[:, 0], first), between(corner[:, 1], corner[:, 0]))
 
     twice = part_by_part(doubled, corner, first)
     sums = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])
@@ -148,7 +148,7 @@ def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray
 
     def shares(corner, polygon):
         normal = sums[polygon]
-        ear = np.cross(between(corner[:, 1], corner[:, 0]), between(corner[:, 2], corner[:, 0]))
+        ear = cross3(between(corner[:, 1], corner[:, 0]), between(corner[:, 2], corner[:, 0]))
         return (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
 
     share = part_by_part(shares, corner, polygon)

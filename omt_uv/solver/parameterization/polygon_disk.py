@@ -13,7 +13,7 @@ import numpy as np
 from ..maps.polygon_elements import polygon_mesh
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import shorter_diagonals
-from ..mesh.geometry import cross2, face_areas, signed_areas
+from ..mesh.geometry import cross2, cross3, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_fans
 from ..mesh.topology import boundary_loops
 
@@ -155,12 +155,12 @@ def _by_ears(triangles: np.ndarray, uv: np.ndarray, positions: np.ndarray) -> np
         return triangles
     left, found = vertices[loops[0]], []
     p = positions[left]
-    normal = np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0)
+    normal = cross3(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0)
     while len(left) > 2:
         ears = np.column_stack([np.roll(left, 1), left, np.roll(left, -1)])
         flat, solid = uv[ears], positions[ears]
         area = cross2(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])
-        height = np.cross(solid[:, 1] - solid[:, 0], solid[:, 2] - solid[:, 0]) @ normal / np.linalg.norm(normal)
+        height = cross3(solid[:, 1] - solid[:, 0], solid[:, 2] - solid[:, 0]) @ normal / np.linalg.norm(normal)
         value = np.minimum(_roundness(flat, area), _roundness(solid, height))
         # What is inside of a triangle of neighbours has a reflex corner among it.
         reflex = left[area <= 0]

@@ -20,7 +20,7 @@ from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..maps.polygon_elements import polygon_elements, restricted, with_convex_quads
 from ..maps.tutte import tutte
-from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
+from ..mesh.geometry import angle_defects, angles_from_lengths, cross3, halfedge_lengths, signed_areas
 from ..mesh.topology import vertices_along_boundary
 from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
@@ -435,4 +435,4 @@ def _side_by_side(union: MeshUnion, w: np.ndarray) -> np.ndarray:
 
 def _normals(union: MeshUnion) -> np.ndarray:
     p = union.positions[union.triangles]
-    return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    return cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])

@@ -19,7 +19,7 @@ from ..maps.development import developed
 from ..maps.energy import elements
 from ..maps.tutte import NO_QUADS, arc_length_parameters, arcs_of_parts, released_vertices, tutte
 from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
-from ..mesh.geometry import dot3, face_areas, lengths, signed_areas
+from ..mesh.geometry import cross3, dot3, face_areas, lengths, signed_areas
 from ..mesh.topology import expand
 from .projected_newton import CircleMotion, FreeMotion, LineMotion, Motion, linear_forms
 
@@ -373,7 +373,7 @@ def inner_curvature(vertices: np.ndarray, triangles: np.ndarray, boundary: np.nd
     for begin in range(0, len(triangles), AT_ONCE):
         p = np.take(vertices, triangles[begin : begin + AT_ONCE], axis=0)
         after, before = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
-        angle[begin : begin + AT_ONCE] = np.arctan2(lengths(np.cross(after, before)), dot3(after, before))
+        angle[begin : begin + AT_ONCE] = np.arctan2(lengths(cross3(after, before)), dot3(after, before))
     defect = 2 * np.pi - np.bincount(triangles.ravel(), angle.ravel(), len(vertices))
     defect[boundary] = 0
     return float(np.abs(defect).sum())

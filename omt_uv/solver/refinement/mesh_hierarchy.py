@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.energy import Elements, elements
-from ..mesh.geometry import complex_cross, cross2, dot2, face_areas
+from ..mesh.geometry import complex_cross, cross2, cross3, dot2, face_areas
 from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
@@ -262,7 +262,7 @@ def _places(V, flat, vertex, row, new, ahead, normal):
     p = (V if flat is None else flat)[vertex[row]]
     sides = ((b - p, c - p), (c - p, a - p), (a - p, b - p))
     if flat is None:
-        weights = np.column_stack([np.einsum("sd,sd->s", np.cross(*pair), normal[row]) for pair in sides])
+        weights = np.column_stack([np.einsum("sd,sd->s", cross3(*pair), normal[row]) for pair in sides])
     else:
         weights = np.column_stack([cross2(*pair) for pair in sides])
     total = weights.sum(1)[:, None]

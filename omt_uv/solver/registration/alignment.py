@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.geometry import nearest_rotations
+from ..mesh.geometry import cross3, nearest_rotations
 from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 
 # Directions of the first axis, and turns about it, of the grid of rotations.
@@ -94,8 +94,8 @@ def rotation_grid() -> np.ndarray:
     """Rotations (DIRECTIONS * TURNS,3,3) spread evenly: a direction for the third axis, and turns about it."""
     direction = fibonacci_sphere(DIRECTIONS)
     helper = np.eye(3)[np.abs(direction).argmin(axis=1)]
-    first = normalized(np.cross(direction, helper))
-    base = np.stack([first, np.cross(direction, first), direction], axis=2)
+    first = normalized(cross3(direction, helper))
+    base = np.stack([first, cross3(direction, first), direction], axis=2)
     turn = 2 * np.pi * np.arange(TURNS) / TURNS
     about = np.zeros((TURNS, 3, 3))
     about[:, 0, 0] = about[:, 1, 1] = np.cos(turn)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import face_normals
+from ..mesh.geometry import cross3, face_normals
 from ..mesh.topology import next_halfedge, twins
 
 # Edges that a walk crosses at most.
@@ -27,9 +27,9 @@ class StraightWalks:
         p = vertices[triangles]
         first, second = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
         # Gradients of the barycentric coordinates within the planes of the faces.
-        normal = np.cross(first, second)
+        normal = cross3(first, second)
         square = np.maximum((normal**2).sum(axis=1), 1e-300)[:, None]
-        two, three = np.cross(second, normal) / square, np.cross(normal, first) / square
+        two, three = cross3(second, normal) / square, cross3(normal, first) / square
         self.gradients = np.stack([-two - three, two, three], axis=1)
 
     def __call__(self, faces: np.ndarray, barycentric: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,8 +78,8 @@ class StraightWalks:
         way = left[active] * share[:, None]
         along = np.einsum("kd,kd->k", way, edge)
         # To the right of the halfedge, out of the old face, is to the left of its twin, into the new one.
-        out = np.einsum("kd,kd->k", way, np.cross(edge, self.normals[halfedge // 3]))
-        into = np.cross(edge, self.normals[other // 3])
+        out = np.einsum("kd,kd->k", way, cross3(edge, self.normals[halfedge // 3]))
+        into = cross3(edge, self.normals[other // 3])
         left[active] = along[:, None] * edge + out[:, None] * into
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, vertex_areas
+from ..mesh.geometry import angle_defects, angles_from_lengths, cross3, halfedge_lengths, vertex_areas
 from ..mesh.topology import graph_components, halfedges, next_halfedge, previous_halfedge, twins
 
 # Of the vertices that could go, those above this quantile of the cost wait for a later round.
@@ -218,7 +218,7 @@ class _ShrinkingMesh:
         key = _keys(j[inner], b[inner], size)
         real = (a < self.n) & (b < self.n)
         p, q, r, s = (self.points[x[real]] for x in (i, a, b, j))
-        old, new = np.cross(q - p, r - p), np.cross(q - s, r - s)
+        old, new = cross3(q - p, r - p), cross3(q - s, r - s)
         area = np.linalg.norm(new, axis=1)
         squares = ((q - s) ** 2).sum(axis=1) + ((r - q) ** 2).sum(axis=1) + ((s - r) ** 2).sum(axis=1)
         shape = np.ones(size)

@@ -20,7 +20,7 @@ from ..cutting.developable_nets import HARD
 from ..maps.development import developed
 from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.charts import Chart
-from ..mesh.geometry import edge_lengths, face_areas, unit
+from ..mesh.geometry import cross3, edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
 from .path_graph import path_to
 
@@ -216,7 +216,7 @@ def flat_sides(chart: Chart, sharp: bool = False) -> np.ndarray:
     """
     graph = PolygonGraph.of(chart, glued=True)
     corners = chart.vertices[chart.triangles]
-    vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    vector = 0.5 * cross3(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     count = len(graph.area)
     whole = np.stack([np.bincount(graph.polygon, x, count) for x in vector.T], axis=1)
     normal = unit(whole)

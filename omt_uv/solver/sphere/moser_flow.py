@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.sparse import solve_spd
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import spherical_areas
 from ..mesh.topology import next_halfedge, previous_halfedge, twins
 from ..progress import Progress, Steps
@@ -107,7 +108,7 @@ def _mean_value_weights(points: np.ndarray, triangles: np.ndarray, samples: np.n
     length = np.maximum(np.linalg.norm(spoke, axis=1), 1e-300)
     # The corner that follows around the vertex lies across the side that ends in it.
     after = twins(triangles)[previous_halfedge(np.arange(len(vertex)))]
-    sine = np.linalg.norm(np.cross(spoke, spoke[after]), axis=1)
+    sine = np.linalg.norm(cross3(spoke, spoke[after]), axis=1)
     half = sine / np.maximum(
         length * length[after] + (spoke * spoke[after]).sum(axis=1), 1e-12 * length * length[after]
     )
@@ -125,7 +126,7 @@ def edge_fluxes(points: np.ndarray, triangles: np.ndarray, gain: np.ndarray) -> 
     m = len(triangles)
     p = points[triangles]
     opposite = np.roll(p, -2, axis=1) - np.roll(p, -1, axis=1)
-    area = 0.5 * np.linalg.norm(np.cross(opposite[:, 0], opposite[:, 1]), axis=1)
+    area = 0.5 * np.linalg.norm(cross3(opposite[:, 0], opposite[:, 1]), axis=1)
     # 4 <grad lambda_j, grad lambda_k> area = <e_j, e_k> / area.
     stiffness = np.einsum("mjd,mkd->mjk", opposite, opposite) / area[:, None, None]
     # The side opposite to corner k is halfedge k + 1.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import PrecisionError
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import normalized, signed_volumes, triple_products
 from ..progress import Progress, Steps
 from .coarsen import CollapseRound, SphereLevel, collapse_to_tetrahedron
@@ -112,7 +113,7 @@ def _best_places(step: CollapseRound, positions: np.ndarray) -> np.ndarray:
     parent = positions[step.parent]
     a, b = positions[step.star[:, 1]], positions[step.star[:, 2]]
     at_parent = step.parent[step.owner]
-    normal = normalized(np.cross(a, b - a))
+    normal = normalized(cross3(a, b - a))
     beside = (step.star[:, 1] == at_parent) | (step.star[:, 2] == at_parent)
     bisector = np.zeros((r, 3))
     np.add.at(bisector, step.owner[beside], normal[beside])

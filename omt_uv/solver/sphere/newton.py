@@ -15,6 +15,7 @@ import numpy as np
 
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, FaceDerivatives, area_forms_of, derivatives_of, energy_of, squared
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from ..refinement.hessian_blocks import Assembly, lone_triangles, long_forms, quad_blocks
 from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, NewtonStep, fold_shares
@@ -62,7 +63,7 @@ def _projected(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
     up = total / np.maximum(size, 1e-300)
     side = p[:, 1] - p[:, 0]
     first = normalized(side - np.einsum("md,md->m", side, up)[:, None] * up)
-    axes = np.stack([first, np.cross(up, first)], axis=1)
+    axes = np.stack([first, cross3(up, first)], axis=1)
     part = np.matmul(p - p[:, :1], axes.swapaxes(1, 2))
     return axes, part.view(complex)[..., 0], up, size
 
@@ -77,8 +78,8 @@ def derivatives(faces: Elements, corner: np.ndarray) -> tuple[np.ndarray, np.nda
 def tangents(positions: np.ndarray) -> np.ndarray:
     """Two orthonormal tangents (n,2,3) at unit vectors (n,3)."""
     least = np.eye(3)[np.abs(positions).argmin(axis=1)]
-    first = normalized(np.cross(positions, least))
-    return np.stack([first, np.cross(positions, first)], axis=1)
+    first = normalized(cross3(positions, least))
+    return np.stack([first, cross3(positions, first)], axis=1)
 
 
 def retract(positions: np.ndarray, axes: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..linalg.sparse import solve_spd
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 
 # Radius of a bump, in distances between neighbouring centres.
@@ -68,7 +69,7 @@ def velocity(points: np.ndarray, basis: BumpBasis, pairs: BumpPairs, coefficient
     y = basis.centres[pairs.centre]
     strength = coefficients[pairs.centre] * _slope(points[pairs.point], y, basis.radius)
     pull = np.stack([np.bincount(pairs.point, strength * c, pairs.point_count) for c in y.T], axis=1)
-    return np.cross(pull, points)
+    return cross3(pull, points)
 
 
 def best_flow(
@@ -76,7 +77,7 @@ def best_flow(
 ) -> np.ndarray:
     """Coefficients (k,) of the flow nearest to the target velocities (n,3), in the mean over the mass (n,)."""
     x, y = points[pairs.point], basis.centres[pairs.centre]
-    v = np.cross(y, x) * _slope(x, y, basis.radius)[:, None]
+    v = cross3(y, x) * _slope(x, y, basis.radius)[:, None]
     k, weight = len(basis.centres), np.sqrt(mass)[pairs.point]
     shape = (pairs.point_count, k)
     flows = sp.vstack([sp.csr_matrix((weight * c, (pairs.point, pairs.centre)), shape=shape) for c in v.T]).tocsr()

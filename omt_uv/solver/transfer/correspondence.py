@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..mesh.closest_point import ClosestPoint
 from ..mesh.cut_mesh import CutMesh, cut_open, on_seam, seam_points
-from ..mesh.geometry import face_normals
+from ..mesh.geometry import cross3, face_normals
 from ..mesh.topology import boundary_edges, halfedges, pair_keys, pair_up
 from .seam_sides import agree_on_sides, locate_corners, locate_faces, reference_vertices
 
@@ -100,7 +100,7 @@ def correspond(
 
 def _leading(owner: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """For every triangle (t,3,3) the largest of its polygon's, (t,)."""
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.linalg.norm(cross3(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     order = np.lexsort((-area, owner))
     first = order[np.unique(owner[order], return_index=True)[1]]
     return first[np.unique(owner, return_inverse=True)[1].ravel()]

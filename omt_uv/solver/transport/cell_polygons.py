@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import as_complex, as_points
+from ..mesh.geometry import as_complex, as_points, cross3
 from ..mesh.spherical_geometry import normalized
 from .convex_domain import ConvexPolygon, Domain
 from .regular_triangulation import by_hull, power_centres
@@ -93,9 +93,9 @@ def spherical_cell_polygons(sites: np.ndarray, site_weights: np.ndarray, hull: H
     normal = np.repeat(facet_normals(sites, site_weights, hull.triangles), 3, axis=0)
     owner = hull.triangles.ravel()
     middle = normalized(_means(normal, owner, len(sites)))
-    x = np.cross(middle, np.eye(3)[np.abs(middle).argmin(axis=1)])
+    x = cross3(middle, np.eye(3)[np.abs(middle).argmin(axis=1)])
     x /= np.linalg.norm(x, axis=1, keepdims=True)
-    y = np.cross(middle, x)
+    y = cross3(middle, x)
     angle = np.arctan2((normal * y[owner]).sum(axis=1), (normal * x[owner]).sum(axis=1))
     order = np.lexsort((angle, owner))
     return CellPolygons(normal[order], _starts(owner, len(sites)))

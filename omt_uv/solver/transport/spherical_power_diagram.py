@@ -18,6 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import TransportError
 from ..mesh.edge_flips import flip_in_place, flip_until_none
+from ..mesh.geometry import cross3
 from ..mesh.spherical_geometry import normalized, triangle_areas, triple_products
 from ..mesh.topology import halfedges, previous_halfedge, twins
 
@@ -70,7 +71,7 @@ def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> 
     area = np.bincount(tail, triangle_areas(middle[tail], before, after), n)
     apart, along = np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1)
     arc = 2 * np.arctan2(apart, along)
-    moment = _sum(tail, 0.5 * arc[:, None] * normalized(np.cross(before, after - before)), n)
+    moment = _sum(tail, 0.5 * arc[:, None] * normalized(cross3(before, after - before)), n)
     once = np.arange(len(tail)) < hull.twin
     i, j = tail[once], head[once]
     radial, across = _from(sites, site_weights, i, j)
@@ -94,7 +95,7 @@ def by_hull(sites: np.ndarray, site_weights: np.ndarray) -> Hull:
         raise TransportError("The sites of the transport leave half of the sphere empty")
     triangles = hull.simplices.astype(np.int64)
     p = points[triangles]
-    inward = np.einsum("md,md->m", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), hull.equations[:, :3]) < 0
+    inward = np.einsum("md,md->m", cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), hull.equations[:, :3]) < 0
     triangles[inward] = triangles[inward][:, [0, 2, 1]]
     hidden = np.flatnonzero(np.bincount(triangles.ravel(), minlength=len(sites)) == 0)
     twin = twins(triangles)
@@ -140,8 +141,8 @@ def facet_normals(sites, site_weights, triangles) -> np.ndarray:
     i, j, k = triangles.T
     (ra, a), (rb, b) = _from(sites, site_weights, i, j), _from(sites, site_weights, i, k)
     y = sites[i]
-    normal = y * np.einsum("md,md->m", y, np.cross(a, b))[:, None]
-    return normalized(normal + ra[:, None] * np.cross(y, b) + rb[:, None] * np.cross(a, y))
+    normal = y * np.einsum("md,md->m", y, cross3(a, b))[:, None]
+    return normalized(normal + ra[:, None] * cross3(y, b) + rb[:, None] * cross3(a, y))
 
 
 def _hollow(sites, site_weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
@@ -149,7 +150,7 @@ def _hollow(sites, site_weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
     i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[previous_halfedge(g)]
     (ra, a), (rb, b), (rc, c) = (_from(sites, site_weights, i, x) for x in (j, k, far))
     y = sites[i]
-    terms = np.stack([r * np.einsum("md,md->m", y, np.cross(u, v)) for r, u, v in ((ra, b, c), (rb, c, a), (rc, a, b))])
+    terms = np.stack([r * np.einsum("md,md->m", y, cross3(u, v)) for r, u, v in ((ra, b, c), (rb, c, a), (rc, a, b))])
     determinant, size = terms.sum(axis=0), np.abs(terms).sum(axis=0)
     possible = (triple_products(sites[i], sites[far], sites[k]) > 0) & (
         triple_products(sites[j], sites[k], sites[far]) > 0

@@ -7,6 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..mesh.geometry import cross3
+
 BALL = "ball"
 CUBE = "cube"
 DOMAINS = (BALL, CUBE)
@@ -27,9 +29,9 @@ class BallDomain:
         """Axes (n,3,3), as columns, at points (n,3); at the boundary the last is the one along which nothing moves."""
         axes = np.tile(np.eye(3), (len(points), 1, 1))
         normal = points[self.boundary] / np.linalg.norm(points[self.boundary], axis=1)[:, None]
-        side = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+        side = cross3(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
         side /= np.linalg.norm(side, axis=1)[:, None]
-        axes[self.boundary] = np.stack([side, np.cross(normal, side), normal], axis=2)
+        axes[self.boundary] = np.stack([side, cross3(normal, side), normal], axis=2)
         return axes
 
     def bending(self, slope: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ..mesh.geometry import cross3
 from .tet_mesh import tet_volumes
 
 # Least eigenvalue, relative to that of the shear at rest.
@@ -156,7 +157,7 @@ def rest_shape(points: np.ndarray, tets: np.ndarray, smallest: float) -> RestSha
 
 def determinants(F: np.ndarray) -> np.ndarray:
     """Of matrices (m,3,3), (m,)."""
-    return np.einsum("mi,mi->m", np.cross(F[:, 0], F[:, 1]), F[:, 2])
+    return np.einsum("mi,mi->m", cross3(F[:, 0], F[:, 1]), F[:, 2])
 
 
 def signed_svd(F: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

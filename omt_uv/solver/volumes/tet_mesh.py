@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..mesh.geometry import cross3
+
 # The face opposite to every vertex of a tetrahedron, looking outwards where its volume is positive.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
@@ -13,7 +15,7 @@ def tet_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Signed volumes (m,) of tetrahedra (m,4) of points (n,3)."""
     p = points[tets]
     a, b, c = (p[:, k] - p[:, 0] for k in (1, 2, 3))
-    return np.einsum("mi,mi->m", np.cross(a, b), c) / 6
+    return np.einsum("mi,mi->m", cross3(a, b), c) / 6
 
 
 def turned_right(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
@@ -55,7 +57,7 @@ def volume_gradients(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Derivative (m,4,3) of the volume of every tetrahedron (m,4) by its vertices."""
     p = points[tets][:, FACES]
     # A third of the area vector of the opposite face, inwards.
-    return -np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]) / 6
+    return -cross3(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]) / 6
 
 
 def share_error(points: np.ndarray, tets: np.ndarray, target: np.ndarray) -> float:

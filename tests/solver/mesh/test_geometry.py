@@ -13,6 +13,7 @@ from omt_uv.solver.mesh.geometry import (
     cotangent_laplacian,
     cotangents_from_lengths,
     cross2,
+    cross3,
     dot2,
     dot3,
     face_areas,
@@ -33,6 +34,8 @@ def test_lengths_and_products_in_columns_are_those_along_the_axis_to_the_bit():
     rng = np.random.default_rng(0)
     a, b = rng.normal(size=(2, 500, 3, 3)) * 10.0 ** rng.integers(-9, 9, size=(500, 1, 1))
     np.testing.assert_array_equal(dot3(a, b), (a * b).sum(axis=-1))
+    for one, other in ((a, b), (a[:, 0], b[0, 0]), (a[0, 0], b[0, 0]), (a[:, :1], b)):
+        np.testing.assert_array_equal(cross3(one, other), np.cross(one, other))
     for vectors in (a, a[..., :2], a[:, 0]):
         np.testing.assert_array_equal(lengths(vectors), np.linalg.norm(vectors, axis=-1))
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...mesh.geometry import cross3
 from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
 
 # Cosine by which a face may turn at most when an edge at it collapses.
@@ -267,7 +268,7 @@ def _sound(
     stays = at_end.sum(axis=1) == 1
     old, mine = points[t[stays]], owner[stays]
     new = np.where(at_end[stays][:, :, None], edges.place[mine][:, None], old)
-    before, after = (np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) for p in (old, new))
+    before, after = (cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) for p in (old, new))
     length = np.sqrt(np.einsum("ij,ij->i", before, before) * np.einsum("ij,ij->i", after, after))
     turned = np.einsum("ij,ij->i", before, after)
     if min_cosine > ANY_COSINE:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mesh.geometry import face_normals, least_angles
+from ...mesh.geometry import cross3, face_normals, least_angles
 from ...mesh.topology import halfedges
 from .closest_pairs import ClosestPairs
 from .fit_state import FitState
@@ -86,7 +86,7 @@ def _moves(points: np.ndarray, patches: RingPatches, copies: int, random: np.ran
     middle = patches.triangles[patches.middle]
     along, up = points[middle[:, 1]] - points[middle[:, 0]], face_normals(points, middle)
     length = np.linalg.norm(along, axis=1, keepdims=True)
-    frame = np.stack([along, np.cross(up, along), ALONG_NORMAL * length * up], axis=1)
+    frame = np.stack([along, cross3(up, along), ALONG_NORMAL * length * up], axis=1)
     shape = (copies, len(points), 1)
     size = SHORTEST * (LONGEST / SHORTEST) ** random.random((copies, len(patches), 1))[:, patches.of_vertex]
     size *= random.random(shape) < MOVING

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ...mesh.geometry import face_normals, least_angles
+from ...mesh.geometry import cross3, face_normals, least_angles
 from ...mesh.topology import halfedges
 
 # Angle, radians, below which forces set in,
@@ -46,7 +46,7 @@ def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> S
     normal = face_normals(points, t)
 
     def turned(v, sign):
-        return -v / 2 + sign * np.sqrt(3) / 2 * np.cross(normal, v)
+        return -v / 2 + sign * np.sqrt(3) / 2 * cross3(normal, v)
 
     first = (off[:, 0] + turned(off[:, 1], -1) + turned(off[:, 2], 1)) / 3
     target = np.stack([first, turned(first, 1), turned(first, -1)], axis=1)
