@@ -45,3 +45,15 @@ def test_maps_without_area_are_refused():
     V, F = meshes.grid(3, 3)
     with pytest.raises(FoldedUVError):
         renumbered(V, F, np.zeros((len(V), 2)), None)
+
+
+@pytest.mark.parametrize(
+    "polygons, counts", [(None, True), ("each", True), ("a quad", False), ("patches over holes", False)]
+)
+def test_a_known_order_counts_where_triangles_are_polygons(polygons, counts):
+    V, F = meshes.bumpy(6, 6)
+    given, each = np.arange(len(V))[::-1], np.arange(len(F))
+    several = {"each": each, "a quad": each // 2 * 2, "patches over holes": np.where(each < 2, -1, each)}
+    mesh = renumbered(V, F, V[:, :2], None, several.get(polygons), given)
+    assert (mesh.order == given).all() == counts
+    assert sorted(mesh.order) == list(range(len(V)))
