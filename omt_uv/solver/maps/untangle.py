@@ -65,7 +65,7 @@ def circle_boundary(uv: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarr
     if not (np.abs(w) > 0).all():
         return None
     turn = np.angle(np.roll(w, -1) / w)
-    if not (turn > 0).all() or abs(turn.sum() - 2 * np.pi) > 1e-6:
+    if not (turn > 0).all() or round(turn.sum() / (2 * np.pi)) != 1:
         return None
     return uv[loop] * (radius / np.abs(w))[:, None]
 

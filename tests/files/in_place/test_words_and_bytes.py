@@ -521,3 +521,22 @@ def test_a_buffer_in_the_text_stays_as_it_is_wherever_the_file_goes(tmp_path):
     for there, same in ((b"raw", True), (b"raw and more", True), (b"ra", False), (b"row", False)):
         (tmp_path / "a b.bin").write_bytes(there)
         assert (gltf._placed(beside, b"raw", tmp_path) is beside) == same
+
+
+def test_what_other_meshes_name_is_not_owned(monkeypatch):
+    """Two primitives name the same accessors, one of them twice; the UVs are named elsewhere, too."""
+    table = {"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "targets": [{"POSITION": 3, "NORMAL": 1}]}
+    mesh = SimpleNamespace(layer=0)
+    parts = [SimpleNamespace(primitive=table, mesh=mesh, corners=np.arange(3)) for _ in range(2)]
+    users = {0: 2, 1: 4, 2: 3, 3: 2}
+    change = SimpleNamespace(doc={"accessors": [{"count": 3}]}, glb=None, users=lambda: users)
+    found = []
+    monkeypatch.setattr(glb, "_old_uv", lambda *_: np.zeros((3, 2), np.float32))
+    monkeypatch.setattr(glb, "_wished", lambda part, old, layers: np.ones((3, 2), np.float32))
+    monkeypatch.setattr(glb, "_write_attributes", lambda *given: found.append(given))
+    assert glb._write_group(change, parts) is parts
+    ((_, _, fresh, copies, owned),) = found
+    assert owned == {0, 1, 3} and fresh["TEXCOORD_0"].tolist() == [[1, 1]] * 3 and not len(copies)
+    users[2] = 2
+    glb._write_group(change, parts)
+    assert found[1][-1] == {0, 1, 2, 3}

@@ -39,6 +39,15 @@ def test_angles_that_are_there_need_no_step(sphere):
     assert flow.iterations == flow.flips == 0 and not flow.log_scale.any()
 
 
+def test_an_error_that_is_allowed_to_the_last_bit_needs_no_step(sphere):
+    tri, n = sphere
+    even = np.full(n, 2 * np.pi * (1 - 2 / n))
+    error = drain(yamabe_flow(tri, np.arange(n), even, tolerance=99.0)).residual
+    assert error > 0
+    for tolerance, steps in ((error, False), (0.999 * error, True)):
+        assert bool(drain(yamabe_flow(tri, np.arange(n), even, tolerance=tolerance)).iterations) == steps
+
+
 def test_a_common_scale_changes_nothing(sphere):
     tri, n = sphere
     even = np.full(n, 2 * np.pi * (1 - 2 / n))

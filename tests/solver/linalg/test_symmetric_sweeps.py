@@ -99,6 +99,42 @@ def test_what_is_added_may_join_vertices_of_a_colour():
     assert solver._parts is None and 0.8 * (b @ best) <= b @ x <= (1 + 1e-9) * (b @ best)
 
 
+@pytest.mark.parametrize("joined", [False, True])
+def test_a_sweep_there_parts_and_a_sweep_back_are_those_vertex_by_vertex(joined):
+    V, F = meshes.bumpy(7, 7)
+    n, rng = len(V), np.random.default_rng(1)
+    pattern = RowPattern([F, np.zeros((0, 4), np.int64)], n)
+    local = rng.normal(size=(len(F), 6, 6))
+    more = sp.random(2 * n, 6, 0.1, "csr", random_state=2) if joined else None
+    more = more @ more.T if joined else None
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks[0], local @ local.swapaxes(1, 2))]), more)
+    rows.add_diagonal(np.full(2 * n, 0.1))
+    unknowns = (2 * pattern.order[:, None] + [0, 1]).ravel()
+    matrix = rows.plain().toarray()[np.ix_(unknowns, unknowns)]
+    spread = sp.csr_matrix(rng.normal(size=(2 * n, 4)))
+    xx, xy, yy = rows._own
+    own = [np.array([[xx[v], xy[v]], [xy[v], yy[v]]]) for v in range(n)]
+    r = rng.normal(size=2 * n)
+
+    def moved(x, v):
+        """The vertex v where nothing is left of its rows, all others as they are."""
+        here = slice(2 * v, 2 * v + 2)
+        return np.linalg.solve(own[v], (r - matrix @ x)[here] + own[v] @ x[here])
+
+    x, colours = np.zeros(2 * n), [range(*pattern.rows(k).indices(n)) for k in range(len(pattern.first) - 1)]
+    for colour in colours:
+        new = {v: moved(x, v) for v in colour}
+        for v, place in new.items():
+            x[2 * v : 2 * v + 2] = place
+    x += spread @ (3 * (spread.T @ (r - matrix @ x)))
+    for colour in reversed(colours):
+        new = {v: moved(x, v) for v in colour}
+        for v, place in new.items():
+            x[2 * v : 2 * v + 2] = place
+    found = sweeps._preconditioner(rows, lambda left: 3 * (spread.T @ left), spread)(r)
+    np.testing.assert_allclose(found, x, atol=1e-9 * np.abs(x).max())
+
+
 def test_what_takes_too_long_is_factored_by_parts(monkeypatch):
     whole, swept, w = flattened("free")
     monkeypatch.setattr(sweeps, "MOST", 2)

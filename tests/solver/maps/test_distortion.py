@@ -13,7 +13,7 @@ import polygons
 import pytest
 
 from omt_uv.solver.errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from omt_uv.solver.maps.distortion import RATIO_FLOOR, distortion, face_distortion, uv_charts
+from omt_uv.solver.maps.distortion import RATIO_FLOOR, distortion, face_distortion, shear_of, uv_charts
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.polygon_areas import polygon_areas
@@ -354,3 +354,16 @@ def test_areas_beyond_the_greatest_number_are_told_as_such():
             figures(1e200 * V, F, V[F][..., :2])
         assert caught.value.elements.tolist() == list(range(len(F)))
         figures(1e60 * V, F, V[F][..., :2])
+
+
+@pytest.mark.parametrize("height", [1.0, 0.5, 1.01e-6, 0.99e-6, 1e-9, 0.0])
+def test_shear_is_told_up_to_a_million(height):
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    for turned in (1, -1):
+        a, b = np.array([[1.0, 0]]), np.array([[0.3, turned * height]])
+        (found,) = shear_of(V, np.array([[0, 1, 2]]), a, b)
+        if height:
+            s = np.linalg.svd(np.column_stack([a[0], b[0]]), compute_uv=False)
+            assert found == pytest.approx(min(s[0] / s[1], 1e6), rel=1e-5)
+        else:
+            assert found == 1e6

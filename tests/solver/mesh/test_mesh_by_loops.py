@@ -27,6 +27,10 @@ def test_orders_are_stable_however_they_are_found(count):
     pairs = [(min(a, b), max(a, b)) for a, b in zip(values.tolist(), other.tolist(), strict=True)]
     np.testing.assert_array_equal(topology.order_of_pairs(keys), sorted(range(count), key=lambda k: (pairs[k], k)))
     assert topology.paired(keys).tolist() == [list(p) for p in pairs]
+    # Numbers too large to be counted: as many as that would take the memory of the machine.
+    large = values << 33
+    np.testing.assert_array_equal(topology.order_of_numbers(large), expected)
+    np.testing.assert_array_equal(topology.order_of_pairs(topology.pair_keys(values, values + 2**30)), expected)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -189,6 +189,9 @@ def test_what_found_no_room_comes_first_in_the_next_orders(failures, orders, mon
         assert tried[1] == [0, 4, 3, 2, 1]
     if failures > 1:
         assert tried[2] == [1, 0, 4, 3, 2]
+    # From then on chance decides, not what got stuck.
+    for before, after in pairwise(tried[pack_square.STUCK_FIRST :]):
+        assert after != [before[-1], *before[:-1]]
     assert (found is None) == (failures == 99) and (found is not None or order == [4, 3, 2, 1, 0])
     assert found is None or found.order == tried[-1] == order
     tried.clear()

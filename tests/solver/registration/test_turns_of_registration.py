@@ -64,6 +64,32 @@ def test_what_had_no_room_is_put_into_its_place_and_polished_again(met, polish, 
         assert (found, steps) == (51, 10 + 30)
 
 
+@pytest.mark.parametrize("met", [[True, True, True], [True, False, True], [False, False, False]])
+def test_of_a_coarse_start_only_what_had_no_room_is_put_into_its_place(met, monkeypatch):
+    problem = SimpleNamespace(held=np.zeros(12, bool), energies=lambda placed: np.full(len(F), float(placed)))
+    monkeypatch.setattr(coarse_start, "deformation", lambda *_: problem)
+    monkeypatch.setattr(coarse_start, "on_coarse", lambda *_: None)
+    monkeypatch.setattr(coarse_start, "minimise_on", lambda *_: done((3, 7), 0.0, 1.0))
+    monkeypatch.setattr(coarse_start, "put_landmarks", lambda problem, placed, *where: (placed + 2, where))
+    monkeypatch.setattr(coarse_start, "replace", lambda problem, within: SimpleNamespace(energy=lambda p: 10 * p))
+    placed = Placed()
+    carrier = SimpleNamespace(sliding=lambda loop: SimpleNamespace(place=lambda domain: placed))
+    case = SimpleNamespace(pair=SimpleNamespace(vertices=V), carrier=carrier, targets="targets", features=None)
+    mesh = coarse_start.FewVertices(np.arange(12), F, V, np.array([7, 3, 9]), None)
+    met = np.array(met)
+    trial = drain(coarse_start._polished(case, mesh, V, met))
+    own = mesh.landmarks[met].tolist()
+    assert placed.holds == (own, met.tolist()) and np.flatnonzero(problem.held).tolist() == sorted(own)
+    if met.all():
+        assert trial.placed == 3 and trial.met is met
+    else:
+        assert trial.placed == 5 and trial.met[0] is mesh.landmarks and trial.met[1] == "targets"
+    assert trial.energy == 10 * trial.placed and trial.steps == 7
+    area = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) / 2
+    each = trial.placed / (1 + trial.placed / (coarse_start.SATURATION * area))
+    assert trial.distortion == pytest.approx(each.sum())
+
+
 @pytest.mark.parametrize("weight", [0.0, -1.0, 2.5])
 def test_features_are_weighed_by_area_and_are_none_without_a_weight(weight):
     described = np.arange(48.0).reshape(12, 4), np.ones((5, 4))

@@ -114,6 +114,7 @@ class Found:
     [
         (False, 0.0, 0.1, 0.0, "free"),
         (True, 0.0079, 0.1, 0.0, "symmetric"),
+        (True, 0.0079, 0.0001, 0.0, "symmetric"),
         (True, 0.0081, 0.0081, 0.0, "free or symmetric"),
         (True, 0.5, 0.001, 0.0, "free"),
         (True, 0.5, 0.001, 0.3, "symmetric"),

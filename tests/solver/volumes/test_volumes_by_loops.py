@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from omt_uv.solver.errors import TetrahedraError
-from omt_uv.solver.volumes import body_map, paper_flow, shells, tet_exact, tet_newton
+from omt_uv.solver.volumes import body_map, meshing, paper_flow, shells, tet_exact, tet_newton
 from omt_uv.solver.volumes.meshing import TetMesh
+from omt_uv.solver.volumes.tet_mesh import boundary_triangles
 
 
 def grid_of_tets(n=3, noise=0.0, seed=0):
@@ -153,3 +155,21 @@ def test_velocities_are_slopes_averaged_by_inverse_distances():
     np.testing.assert_allclose(
         paper_flow._velocity(flat, more, flat @ slope)[:-1], np.tile(slope, (len(points), 1)), atol=1e-9
     )
+
+
+def test_what_has_no_chords_is_not_split(monkeypatch):
+    points, tets = grid_of_tets(2)
+    faces = boundary_triangles(tets)
+    found, split = meshing.without_chords(points, tets, faces)
+    n, edges = len(points), {frozenset(e) for t in split.tolist() for e in combinations(t, 2)}
+    on, outer = set(np.unique(faces).tolist()), {frozenset(e) for t in faces.tolist() for e in combinations(t, 2)}
+    assert not {e for e in edges if e <= on} - outer and len(found) > n
+    np.testing.assert_array_equal(found[:n], points)
+    assert volumes(found, split).min() > 0 and volumes(found, split).sum() == pytest.approx(1)
+
+    def never(*_):
+        raise AssertionError("nothing is to be split")
+
+    monkeypatch.setattr(meshing, "_split", never)
+    again, same = meshing.without_chords(found, split, faces)
+    assert again is found and same is split
