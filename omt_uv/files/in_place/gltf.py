@@ -115,7 +115,7 @@ def put(data: bytes, meshes: Sequence[Imported], folder: Path, target: Path) -> 
 def _contents(glb: Glb) -> list[tuple]:
     """What the views of a file hold, byte for byte, in the order in which they are named."""
     views, held = glb.doc["bufferViews"], []
-    for index in mentions({key: of for key, of in glb.doc.items() if key != "bufferViews"}):
+    for index in mentions(glb.doc):
         begin = views[index].get("byteOffset", 0)
         held.append((glb.binary[begin : begin + views[index]["byteLength"]], views[index].get("byteStride")))
     return held

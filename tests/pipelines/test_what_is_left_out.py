@@ -1,0 +1,60 @@
+"""What belongs to one object and not to another, with islands that are written in advance."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from omt_uv.pipelines.arranging import actions
+from omt_uv.pipelines.layout import Refusal, grown_together
+from omt_uv.solver.errors import MeshError
+
+
+def island(owner, number):
+    chart = SimpleNamespace(vertices=("vertices", number), triangles=("triangles", number))
+    return SimpleNamespace(owner=owner, island=SimpleNamespace(uv=np.full((1, 2), number), chart=chart))
+
+
+def reading(low, high):
+    positions = np.array([[0, 0, 0], [0.0, low, 0], [0, high, 0], [0, 99, 0]])
+    return SimpleNamespace(surface=SimpleNamespace(positions=positions, corner_vertex=np.array([1, 2])))
+
+
+def test_each_object_has_a_middle_and_islands_of_its_own(monkeypatch):
+    found = [island(2, 0), island(0, 1), island(2, 2), island(0, 3)]
+    readings = [reading(-1.0, 3.0), reading(0.0, 1.0), reading(5.0, 6.0)]
+    calls = []
+
+    def halves(jobs, normal, at, on_one_another):
+        calls.append(
+            ([v[1] for v, _, _ in jobs], [int(uv[0, 0]) for *_, uv in jobs], normal.tolist(), at, on_one_another)
+        )
+        return SimpleNamespace(uv=[uv + 100 for *_, uv in jobs], partner=np.array([0, -1])[: len(jobs)])
+
+    monkeypatch.setattr(actions, "islands_of", lambda readings: found)
+    monkeypatch.setattr(actions, "halves", halves)
+    monkeypatch.setattr(actions, "arranged", lambda *given, apart=True: given)
+    count, _, uv, changed, warnings = actions.symmetrize_islands(readings, 1, True)
+    axis = [0.0, 1.0, 0.0]
+    assert calls == [([1, 3], [1, 3], axis, 1.0, True), ([0, 2], [0, 2], axis, 5.5, True)]
+    assert count == 3 and [int(x[0, 0]) for x in uv] == [100, 101, 102, 103] and changed == 2
+    assert len(warnings) == 1 and warnings[0][0] == -1 and warnings[0][1].startswith("2 islands have none there")
+
+    def refused(jobs, *more):
+        raise MeshError("No")
+
+    monkeypatch.setattr(actions, "halves", refused)
+    found[:] = [one for one in found if one.owner == 2]
+    with pytest.raises(Refusal) as caught:
+        actions.symmetrize_islands(readings, 0, False)
+    assert caught.value.index == 2
+
+
+def test_islands_without_uvs_before_had_nothing_in_common():
+    square, chart = np.array([[0.0, 0], [1, 0], [0, 1]]), SimpleNamespace(triangles=np.array([[0, 1, 2]]))
+    new = SimpleNamespace(before=None, uv=square, chart=chart)
+    old = SimpleNamespace(before=square + 3, uv=square, chart=chart)
+    assert "Islands grew into each other" in grown_together([new, old])
+    assert not grown_together([old, SimpleNamespace(before=square + 3, uv=square, chart=chart)])
