@@ -109,7 +109,7 @@ def test_what_is_lost_is_halved_until_a_tenth_is_left():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     both = tet_exact._both(np.array([[0, 1, 2, 3]]), points, points)
     domain = SimpleNamespace(retract=lambda x: x)
-    for down, left in ((0.89, 0.11), (0.91, 1 - 0.91 / 2), (1.5, 0.25), (1.9, 1 - 0.95 / 2), (4.0, 0.5)):
+    for down in (0.89, 0.91, 1.5, 1.9, 4.0):
         moves = np.zeros((2, 4, 3))
         moves[1, 3, 2] = -down
         found = tet_exact._without_inversion(both, domain, moves, lambda trial: True)
@@ -359,7 +359,7 @@ def test_landmarks_that_meet_are_left_where_they_are(apart, flows, monkeypatch):
     positions = np.arange(6.0).reshape(2, 3)
     found = drain(registration.registered(positions, landmarks, goals))
     assert bool(asked) == flows and (found.positions == positions + flows).all()
-    assert found.before == pytest.approx(apart, abs=1e-20)
+    assert found.before == pytest.approx(apart, rel=1e-9, abs=0)
     if flows:
         ((points, handles, options),) = asked
         assert np.array_equal(points, np.concatenate([positions, landmarks])) and options.radius == 0.25
