@@ -1,4 +1,4 @@
-"""GLB and PLY files that say what cannot be, and what nobody asked of them: each is refused by what is wrong with it."""
+"""GLB and PLY files that say what cannot be: each is refused by what is wrong with it, and a neighbour of it goes."""
 
 from __future__ import annotations
 
