@@ -26,5 +26,6 @@ def grid_of_tets(n=3, noise=0.0, seed=0):
 
 
 def volumes(points, tets):
+    """The signed volume (m,) of each."""
     p = points[tets]
     return np.linalg.det(p[:, 1:] - p[:, :1]) / 6
