@@ -6,10 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted_steps import done, told
 
+from omt_uv.pipelines import refine as refinement
 from omt_uv.pipelines.arranging import actions
 from omt_uv.pipelines.layout import Refusal, grown_together
-from omt_uv.solver.errors import MeshError
+from omt_uv.solver.errors import MeshError, PinError
 
 
 def island(owner, number):
@@ -58,3 +60,28 @@ def test_islands_without_uvs_before_had_nothing_in_common():
     old = SimpleNamespace(before=square + 3, uv=square, chart=chart)
     assert "Islands grew into each other" in grown_together([new, old])
     assert not grown_together([old, SimpleNamespace(before=square + 3, uv=square, chart=chart)])
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_an_outline_that_folds_is_told_as_such_where_it_was_to_be_kept(keeps, monkeypatch):
+    error, asked = PinError("Pins fold", kind="vertex", elements=[3]), []
+
+    def refine(*mesh, **given):
+        asked.append(given["pins"])
+        return done(error)
+
+    monkeypatch.setattr(refinement, "refine_island", refine)
+    V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    chart = SimpleNamespace(vertices=V, triangles=F, faces=np.zeros(1, int))
+    one = SimpleNamespace(chart=chart, uv=2 * V[:, :2])
+    pins = SimpleNamespace(vertices=np.array([1]), places=np.array([[5.0, 5]]))
+    settings = SimpleNamespace(keep_boundary=keeps, balance=0.5, quality="draft")
+    with pytest.raises(PinError) as caught:
+        told(refinement._improve(one, pins, settings, None))
+    vertices, places = asked[0]
+    assert vertices.tolist() == ([1, 0, 2] if keeps else [1])
+    assert places.tolist() == [[5, 5], [0, 0], [0, 2]][: len(vertices)]
+    if keeps:
+        assert "cannot be kept" in str(caught.value) and caught.value.elements == [3] and caught.value.kind == "vertex"
+    else:
+        assert caught.value is error

@@ -1,4 +1,4 @@
-"""Branches of remeshing, seams and flows that meshes take seldom: what is decided there, with pieces written in advance."""
+"""Branches of remeshing, seams and flows that are taken seldom: what is decided there, with pieces written before."""
 
 from __future__ import annotations
 
