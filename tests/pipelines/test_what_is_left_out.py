@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scripted_steps import done, told
 
+from omt_uv.pipelines import magnify as magnified
 from omt_uv.pipelines import refine as refinement
 from omt_uv.pipelines.arranging import actions
 from omt_uv.pipelines.layout import Refusal, grown_together
@@ -85,3 +86,27 @@ def test_an_outline_that_folds_is_told_as_such_where_it_was_to_be_kept(keeps, mo
         assert "cannot be kept" in str(caught.value) and caught.value.elements == [3] and caught.value.kind == "vertex"
     else:
         assert caught.value is error
+
+
+@pytest.mark.parametrize("pinned", [None, [False, False], [False, True]])
+def test_surfaces_without_a_pin_are_unwrapped_as_if_nobody_had_pinned_anything(pinned, monkeypatch):
+    asked = []
+    pins = None if pinned is None else SimpleNamespace(pinned=np.array(pinned))
+    region = SimpleNamespace(
+        surface=SimpleNamespace(triangles=np.zeros((4, 3), int)), faces="faces", pins=pins, subdivision=None, axes=None
+    )
+    rows, area, weights = np.array([1, 3]), np.array([1.0, 3.0]), np.array([0.0, 1.0])
+    monkeypatch.setattr(magnified, "region_triangles", lambda region: (rows, area, weights))
+
+    def lay_out(jobs, settings):
+        asked.extend([jobs, settings.boundary])
+        return done(RuntimeError("enough"))
+
+    monkeypatch.setattr(magnified, "lay_out", lay_out)
+    with pytest.raises(RuntimeError, match="enough"):
+        told(magnified._from_mesh([region], magnified.MagnifySettings(factor=1.2)))
+    (job,), boundary = asked
+    assert job.pins is (pins if pinned and any(pinned) else None)
+    full = [value for value in vars(job.target).values() if isinstance(value, np.ndarray)]
+    assert full[0][[0, 2]].tolist() == [1, 1] and full[0][3] > full[0][1] and full[1].tolist() == [0, 0, 0, 1]
+    assert boundary != "own"

@@ -78,7 +78,7 @@ def grip(matrix: np.ndarray, size: float) -> np.ndarray:
 def _rotation(matrix: np.ndarray) -> np.ndarray:
     """The rotation (3,3) in a matrix (4,4), without scale and shear."""
     u, _, v = np.linalg.svd(matrix[:3, :3])
-    return u @ np.diag([1, 1, np.sign(np.linalg.det(u @ v)) or 1.0]) @ v
+    return u @ np.diag([1, 1, np.sign(np.linalg.det(u @ v))]) @ v
 
 
 def _world(obj: bpy.types.Object) -> np.ndarray:

@@ -209,7 +209,7 @@ def _carry_parts(wrapped: np.ndarray, surface: Surface, part: MatchedPart) -> No
         before, after = part.vertices[near], wrapped[part.used[near]]
         middle, there = before.mean(axis=0), after.mean(axis=0)
         left, value, right = np.linalg.svd((after - there).T @ (before - middle))
-        sign = np.array([1, 1, np.sign(np.linalg.det(left) * np.linalg.det(right)) or 1.0])
+        sign = np.array([1, 1, np.sign(np.linalg.det(left) * np.linalg.det(right))])
         scale = float((value * sign).sum() / max(float(((before - middle) ** 2).sum()), 1e-300))
         wrapped[mine] = scale * (surface.positions[mine] - middle) @ ((left * sign) @ right).T + there
 
