@@ -1,4 +1,4 @@
-"""Pieces of maps triangle by triangle: directions of islands, least moves of faces, sides that are let go, one to one."""
+"""Pieces of maps triangle by triangle: directions of islands, least moves of faces, sides let go, maps one to one."""
 
 from __future__ import annotations
 
