@@ -283,7 +283,8 @@ def test_a_globe_is_mapped_with_its_holes_filled_and_laid_out_without_them(balan
     V = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     component = SimpleNamespace(
         vertices=V, centres=np.array([[0.0, 0, -1]]), triangles=np.array([[0, 1, 2], [0, 2, 1]]),
-        members=np.array([1, 2]), fans=np.array([[1, 0, 3]]), faces=np.array([0, 1]), corners=np.array([[0, 1, 2], [3, 4, 5]]),
+        members=np.array([1, 2]), fans=np.array([[1, 0, 3]]), faces=np.array([0, 1]),
+        corners=np.array([[0, 1, 2], [3, 4, 5]]),
     )  # fmt: skip
     asked = []
     found = SimpleNamespace(positions=np.concatenate([V, -V[:1]]), warnings=("of the map",))
