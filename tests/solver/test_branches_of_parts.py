@@ -15,8 +15,10 @@ from omt_uv.solver.flows import creases
 from omt_uv.solver.remeshing.components.components import split_components
 from omt_uv.solver.remeshing.edits.vertex_count import apportion
 from omt_uv.solver.remeshing.fitting import fit
-from omt_uv.solver.remeshing.initial import decimation, disk_samples
+from omt_uv.solver.remeshing.initial import decimation, disk_samples, initial_mesh
 from omt_uv.solver.seams import coarse_cut, coarse_surface, search
+from omt_uv.solver.signatures import reference
+from omt_uv.solver.sphere import polygon_surface
 
 # ---- remeshing -----------------------------------------------------------------------------------------------
 
@@ -217,3 +219,98 @@ def test_affine_maps_of_more_rings_are_tried_while_pairs_are_left(left, far, use
     assert [a[0] for a in asked] == list(creases.RINGS[:used])
     assert [a[1] for a in asked] == [6, *left][:used]
     assert (position == after + best).all() and len(pairs) == (left[best - 1] if best else 6)
+
+
+# ---- charts and bodies -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rounds", [0, 3])
+@pytest.mark.parametrize("works", ["at once", "evenly", "never"])
+@pytest.mark.parametrize("many", [False, True])
+def test_charts_that_cannot_be_triangulated_are_so_by_even_maps_or_refused(rounds, works, many, monkeypatch):
+    asked = []
+    count = initial_mesh.FEW + many
+
+    def triangulate(places, disk, loop, maps, boundary, inner):
+        asked.append(maps)
+        good = {"at once": True, "evenly": maps == ("even", "even"), "never": False}[works]
+        return ("mesh", maps) if good else None
+
+    def of_chart(k, density):
+        return done(SimpleNamespace(pair=lambda strategy: ("a map", strategy), warnings=("told",)))
+
+    monkeypatch.setattr(initial_mesh, "triangulate_chart", triangulate)
+    monkeypatch.setattr(initial_mesh, "even_image", lambda *_: "even")
+    chart = SimpleNamespace(vertex_ids=np.arange(3), vertices=None, disk=None, faces=np.array([1, 2]))
+    component = SimpleNamespace(vertices=np.zeros((3, 3)), faces=np.array([7, 8, 9]))
+    maps = SimpleNamespace(charts=[chart], component=component, of_chart=of_chart)
+    boundary, options = SimpleNamespace(samples=np.arange(5)), SimpleNamespace(rounds=rounds, strategy="x")
+    steps = initial_mesh._chart_mesh(maps, 0, None, boundary, count, None, options)
+    mapped = many or not rounds
+    if works == "never" and not rounds:
+        with pytest.raises(errors.CrowdedError, match="2 triangles leaves no room") as caught:
+            told(steps)
+        assert list(caught.value.elements) == [8, 9]
+        return
+    mesh, warnings = told(steps)[0]
+    if works == "never":
+        assert mesh is None and warnings == ()
+    elif works == "at once" and mapped:
+        assert mesh == ("mesh", ("a map", "x")) and warnings == ("told",) and len(asked) == 1
+    else:
+        assert mesh == ("mesh", ("even", "even")) and warnings == () and len(asked) == 1 + mapped
+    boundary.samples = np.arange(3)
+    alone = told(initial_mesh._chart_mesh(maps, 0, None, boundary, 0, None, options))[0][0]
+    assert alone.triangles.tolist() == [[0, 1, 2]] and not len(alone.points)
+
+
+def test_polygons_of_many_sides_become_fans_at_their_density():
+    """A prism of six sides: two hexagons and six quads; the lower hexagon is twice as dense."""
+    angle = np.pi / 3 * np.arange(6)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    V = np.concatenate([np.column_stack([ring, np.full(6, z)]) for z in (0.0, 1.0)])
+    F, of = [], []
+    for k in range(6):
+        a, b = k, (k + 1) % 6
+        F += [[a, b, b + 6], [a, b + 6, a + 6]]
+        of += [10 + k] * 2
+    for k in range(1, 5):
+        F += [[0, k + 1, k], [6, 6 + k, 7 + k]]
+        of += [3, 4]
+    F, of = np.array(F), np.array(of)
+
+    @dataclass(frozen=True)
+    class Closed:
+        vertices: np.ndarray
+        triangles: np.ndarray
+
+    area = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) / 2
+    target = area * np.where(of == 3, 2.0, 1.0)
+    given = polygon_surface.PolygonSurface(Closed(V, F), of, target)
+    found = polygon_surface.with_polygon_fans(given)
+    points, faces = found.surface.vertices, found.surface.triangles
+    assert len(points) == 14 and sorted(map(tuple, points[12:].round(9))) == [(0, 0, 0), (0, 0, 1)]
+    assert len(faces) == 12 + 12 and np.bincount(found.polygons).tolist() == [6, 6, 2, 2, 2, 2, 2, 2]
+    a, b, c = points[faces].transpose(1, 0, 2)
+    new = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    dense = np.where(found.polygons == 0, 2.0, 1.0)
+    np.testing.assert_allclose(found.target, new / 2 * dense)
+    assert polygon_surface.with_polygon_fans(polygon_surface.PolygonSurface(Closed(V, F), None, target)) is None
+    quads = of >= 10
+    only = polygon_surface.PolygonSurface(Closed(V, F[quads]), of[quads], target[quads])
+    assert polygon_surface.with_polygon_fans(only) is None
+
+
+def test_pairs_of_points_and_triangles_have_the_angles_between_them():
+    rng = np.random.default_rng(0)
+    V, F = meshes.icosphere(1)
+    points = rng.normal(size=(4, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    points[3] = -V[0]
+    found = reference._pairs(V, F, points)
+    assert found.face.tolist() == np.repeat(np.arange(len(F)), 4).tolist()
+    assert found.site.tolist() == [0, 1, 2, 3] * len(F) and not found.last.any()
+    for row in (0, 3, 17, len(F) * 4 - 1):
+        cosine = np.clip(V[F[found.face[row]]] @ points[found.site[row]], -1, 1)
+        np.testing.assert_allclose(found.squared[row], np.arccos(cosine) ** 2, atol=1e-6)
+        assert found.nearest[row] == found.squared[row].min() and found.farthest[row] == found.squared[row].max()
