@@ -64,11 +64,11 @@ def preview(objects: Sequence[Placed], tile: int = TILE) -> np.ndarray:
 def _drawn(objects: Sequence[Placed]) -> _Drawn:
     """The triangles of all objects."""
     parts = [_of_object(item) for item in objects]
-    uvs = [part.uv for part in parts]
+    uvs = [part.uv for part in parts if part.uv is not None]
     return _Drawn(
         space=np.concatenate([part.space for part in parts]),
         normals=np.concatenate([part.normals for part in parts]),
-        uv=None if any(uv is None for uv in uvs) else np.concatenate([uv for uv in uvs if uv is not None]),
+        uv=np.concatenate(uvs) if len(uvs) == len(parts) else None,
         real=np.concatenate([part.real for part in parts]),
         octaves=np.concatenate([part.octaves for part in parts]),
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -100,3 +102,14 @@ def test_a_picture_is_read_back_from_its_bytes(package, tmp_path):
     image.colorspace_settings.name = "Non-Color"
     read = np.array(image.pixels[:]).reshape(7, 11, 4)[::-1, :, :3]
     assert np.abs(read - picture).max() <= 0.51 / 255
+
+
+def test_a_layout_is_drawn_where_every_object_has_uvs(package, monkeypatch):
+    preview = package("display.preview")
+    whole = [SimpleNamespace(space=np.ones((k, 3, 3)), normals=np.ones((k, 3, 3)), uv=np.full((k, 3, 2), float(k)),
+                             real=np.ones((k, 3), bool), octaves=np.zeros(k)) for k in (2, 3)]  # fmt: skip
+    monkeypatch.setattr(preview, "_of_object", lambda item: item)
+    found = preview._drawn(whole)
+    assert found.uv[:, 0, 0].tolist() == [2, 2, 3, 3, 3] and len(found.space) == len(found.octaves) == 5
+    whole[1].uv = None
+    assert preview._drawn(whole).uv is None

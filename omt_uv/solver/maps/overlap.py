@@ -34,7 +34,7 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     points = _draw(tri, area, samples, seed)
     pairs = np.cumsum(grid.candidates(points))
     points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
-    covered = [grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)]) if len(chunk)]
+    covered = [grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)])]
     return float((np.concatenate(covered) > 1).mean())
 
 

@@ -78,7 +78,7 @@ def test_distances_are_a_table_and_classes_those_of_neighbours(
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("3 shapes, 3 distances in ")
     if knn:
-        # The nearest of the first two are one another, of the third the first; of others the first has the third.
+        # Of the first two each is nearest to the other, the first to the third; of others the first has the third.
         assert said[1] == "66.7 % of the classes are those of 1 neighbours"
         assert said[2:] == (["0.0 % are those of 1 neighbours of others"] if owners else [])
     else:

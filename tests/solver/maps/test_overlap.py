@@ -4,6 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.maps import overlap
 from omt_uv.solver.maps.overlap import overlap_share
 
 
@@ -65,3 +66,16 @@ def test_pairs_say_what_samples_say(monkeypatch, width):
 
 def test_a_map_without_area():
     assert overlap_share(np.zeros((4, 3, 2))) == 0
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_samples_are_looked_at_in_parts_of_any_size(chunk, monkeypatch):
+    rng = np.random.default_rng(0)
+    uv = rng.random((30, 1, 2)) + 0.3 * rng.random((30, 3, 2))
+    share = overlap.overlap_share(uv, samples=500)
+    points = rng.random((40, 2))
+    pairs = overlap.cover_pairs(uv, points)
+    monkeypatch.setattr(overlap, "CHUNK", chunk)
+    assert overlap.overlap_share(uv, samples=500) == share > 0
+    for one, other in zip(overlap.cover_pairs(uv, points), pairs, strict=True):
+        np.testing.assert_array_equal(one, other)
