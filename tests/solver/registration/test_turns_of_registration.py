@@ -378,3 +378,95 @@ def test_landmarks_go_in_strides_and_relax_after_each(way, stuck, monkeypatch):
         assert moves == pytest.approx(even + [way] * 40)
     assert relaxed == [(2, [3, 8])] * len(moves) + [(20, [3, 8])]
     assert found.placed == "put" and found.steps == len(relaxed) and held.sum() == 1
+
+
+# ---- coarse starts ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("count", "coarse"), [(0, False), (-1, False), (1, True)])
+@pytest.mark.parametrize("made", [True, False])
+@pytest.mark.parametrize("domain", ["sphere", "disk"])
+def test_large_sources_begin_with_few_vertices_and_spheres_are_improved(count, coarse, made, domain, monkeypatch):
+    """Twice as many vertices as the coarse mesh has are large."""
+    n = 2 * coarse_start.COARSE + min(count, 0)
+    coarse = n >= 2 * coarse_start.COARSE
+    asked = []
+    few = SimpleNamespace(carried=lambda places, others: ("carried", places, others), name="few")
+    whole = SimpleNamespace(carried=few.carried, name="whole")
+    monkeypatch.setattr(coarse_start, "_whole", lambda case: whole)
+    monkeypatch.setattr(coarse_start, "coarse_mesh", lambda *given: asked.append(given[-1]) or (few if made else None))
+    flow = Drawn(SimpleNamespace(domain="flowed"), np.array([True]), 5)
+    first = SimpleNamespace(placed=SimpleNamespace(domain="polished"), met="met", steps=7)
+    better = SimpleNamespace(placed=SimpleNamespace(domain="improved"), met="all", steps=70)
+    used = []
+    monkeypatch.setattr(coarse_start, "_flowed", lambda case, mesh: used.append(mesh.name) or done(flow, 0.0, 1.0))
+    monkeypatch.setattr(coarse_start, "_polished", lambda case, mesh, places, met: done(first, 0.0, 1.0))
+    monkeypatch.setattr(coarse_start, "_improved", lambda case, mesh, flow, best: done(better, 0.0, 1.0))
+    monkeypatch.setattr(coarse_start, "_finished", lambda case, moved, met, steps: done((moved, met, steps), 1.0))
+    kind = coarse_start.SPHERE if domain == "sphere" else "disk"
+    pair = SimpleNamespace(vertices=np.zeros((n, 3)), landmarks=None, loop=None, domain=kind)
+    found, fractions = told(coarse_start.coarse_start(SimpleNamespace(pair=pair, aligned="aligned")))
+    assert used == (["few"] if coarse and made else ["whole"]) and asked == [coarse_start.COARSE] * coarse
+    last = ("improved", "all", 75) if domain == "sphere" else ("polished", "met", 12)
+    assert found == (("carried", last[0], "aligned"), *last[1:])
+    assert fractions == pytest.approx([0, 0.2, 0.2, 0.4, *((0.4, 0.8) if domain == "sphere" else ()), 1])
+
+
+@pytest.mark.parametrize("met", [[True, False], [True, True], [False, False]])
+def test_guided_places_are_drawn_nearer_and_nearer(met, monkeypatch):
+    asked = []
+
+    def deformation(reference, triangles, carrier, features, domain):
+        problem = SimpleNamespace(held=np.zeros(12, bool))
+        asked.append((features, domain, problem))
+        return problem
+
+    class Put(Placed):
+        pass
+
+    made = []
+
+    def place(domain):
+        made.append(Put(domain=domain))
+        return made[-1]
+
+    def minimise(problem, placed, steps, tolerance, name):
+        assert (steps, tolerance) == (coarse_start.GUIDED_STEPS, coarse_start.TOLERANCE)
+        return done((SimpleNamespace(domain=placed.domain + 1), 3), 0.0, 1.0)
+
+    monkeypatch.setattr(coarse_start, "deformation", deformation)
+    monkeypatch.setattr(coarse_start, "minimise_on", minimise)
+    monkeypatch.setattr(coarse_start, "Features", lambda values, of_target, share: (values, of_target, share))
+    carrier = SimpleNamespace(sliding=lambda loop: SimpleNamespace(place=place))
+    target = SimpleNamespace(vertices=7 * V)
+    pair = SimpleNamespace(vertices=np.concatenate([9 + V, V]), target=target)
+    case = SimpleNamespace(pair=pair, carrier=carrier, targets="targets")
+    mesh = coarse_start.FewVertices(np.arange(12, 24), F, V, np.array([7, 3]), None)
+    met = np.array(met)
+    found = drain(coarse_start._guided(case, mesh, (V, met), 5 * V, (0.5, 0.25)))
+    np.testing.assert_allclose(found, V + 2)
+    for k, width in enumerate((0.5, 0.25)):
+        (values, of_target, share), domain, problem = asked[k]
+        np.testing.assert_allclose(values, 5 * V / width)
+        np.testing.assert_allclose(of_target, 7 * V / width)
+        np.testing.assert_allclose(share, coarse_start.GUIDE_WEIGHT / 12)
+        np.testing.assert_allclose(domain, V + k)
+        own = mesh.landmarks[met].tolist()
+        assert made[k].holds == (own, met.tolist()) and np.flatnonzero(problem.held).tolist() == sorted(own)
+
+
+def test_what_was_only_just_straightened_is_relaxed_with_its_landmarks_held(monkeypatch):
+    problem = SimpleNamespace(held=np.zeros(12, bool))
+    asked = []
+
+    def minimise(problem, placed, steps, tolerance, name):
+        asked.append((np.flatnonzero(problem.held).tolist(), placed, steps))
+        return done((SimpleNamespace(domain="relaxed"), 2), 0.0, 1.0)
+
+    monkeypatch.setattr(coarse_start, "deformation", lambda *_: problem)
+    monkeypatch.setattr(coarse_start, "minimise_on", minimise)
+    monkeypatch.setattr(coarse_start, "in_space", lambda places: places)
+    case = SimpleNamespace(domain_carrier=lambda loop: SimpleNamespace(place=lambda places: ("placed", places)))
+    mesh = coarse_start.FewVertices(np.arange(12), F, V, np.array([7, 3]), None)
+    assert drain(coarse_start._relaxed(case, mesh, "places")) == "relaxed"
+    assert asked == [([3, 7], ("placed", "places"), coarse_start.RELAXING_STEPS)]
