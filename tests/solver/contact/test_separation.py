@@ -71,3 +71,21 @@ def test_faces_with_a_common_vertex_part_too():
     mended = separated(V, after, F, pairs, np.ones(5, bool))
     assert not len(intersecting_pairs(mended, F))
     assert np.abs(mended - after).max() < 0.2
+
+
+def test_planes_that_turn_stay_planes(monkeypatch):
+    """Their normals keep their length, round by round: what is beyond a plane is measured along them."""
+    V, F = two_balls(0.05)
+    half, lengths = len(V) // 2, []
+    after = V.copy()
+    after[half:, 0] -= 0.09
+    shared = separation._shared
+
+    def watched(missing, place, normal, movable):
+        lengths.append(np.linalg.norm(normal, axis=1))
+        return shared(missing, place, normal, movable)
+
+    monkeypatch.setattr(separation, "_shared", watched)
+    separated(V, after, F, intersecting_pairs(after, F), np.arange(len(V)) % 2 == 0)
+    assert len(lengths) > 3
+    np.testing.assert_allclose(np.concatenate(lengths), 1, atol=1e-12)
