@@ -64,7 +64,7 @@ def _rings(outer: np.ndarray) -> tuple[list[float], list[np.ndarray]]:
     fewer inwards, and one for the centre."""
     radii, angles = [1.0], [np.concatenate([[0.0], outer])]
     edge = 2 * np.pi / len(angles[0])
-    while radii[-1] > 0:
+    while True:
         step = edge + GROWTH * (1 - radii[-1])
         radius = radii[-1] - np.sqrt(3) / 2 * step
         if radius < step / 2:
@@ -72,7 +72,6 @@ def _rings(outer: np.ndarray) -> tuple[list[float], list[np.ndarray]]:
         sectors = max(int(np.ceil(2 * np.pi * radius / step)), 3)
         radii.append(radius)
         angles.append(2 * np.pi * (np.arange(sectors) + 0.5 * (len(angles) % 2)) / sectors)
-    return radii, angles
 
 
 def _strip(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:

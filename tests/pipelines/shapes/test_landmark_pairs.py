@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
+from omt_uv.pipelines.shapes import landmark_pairs
 from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, PairsError, pairs_of, read_pairs
 
 
@@ -52,3 +54,25 @@ def test_rows_before_the_one_that_is_none_are_counted(tmp_path):
     path.write_text(json.dumps([[1, 2], [3, 4], [5, 6, 7]]))
     with pytest.raises(PairsError, match=r"pair [23] is none"):
         read_pairs(path)
+
+
+@pytest.mark.parametrize("text", [None, "{", "\xff"])
+def test_a_file_of_pairs_that_cannot_be_read_is_named(tmp_path, text):
+    path = tmp_path / "pairs.json"
+    if text is not None:
+        path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(landmark_pairs.PairsError, match="pairs"):
+        landmark_pairs.read_pairs(path)
+
+
+@pytest.mark.parametrize(("vertex", "there"), [(0, True), (2, True), (3, False), (4, False)])
+def test_landmarks_are_at_vertices_of_faces(vertex, there):
+    """The fourth vertex has no face, and there is no fifth one."""
+    V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [9, 9, 9]]), np.array([[0, 1, 2]])
+    point = landmark_pairs.LandmarkPoint("nose", vertex)
+    if there:
+        faces, weights = landmark_pairs._located((point,), V, F)
+        assert faces.tolist() == [0] and weights[0] == pytest.approx(np.eye(3)[vertex])
+    else:
+        with pytest.raises(landmark_pairs.PairsError, match="nose"):
+            landmark_pairs._located((point,), V, F)

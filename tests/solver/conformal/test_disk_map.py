@@ -261,3 +261,13 @@ def test_turning_sense_is_counter_clockwise():
     uv = drain(conformal_disk(V, F)).uv
     (loop,) = boundary_loops(F)
     assert (cross2(uv[loop], uv[np.roll(loop, -1)]) > 0).all()
+
+
+def test_a_square_of_two_triangles_has_its_own_corners():
+    V, F = np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    found = drain(conformal_rectangle(V, F, np.array([1, 2, 3, 0])))
+    np.testing.assert_allclose(found.uv, [[0, 2], [0, 0], [1, 0], [1, 2]], atol=1e-6)
+    assert found.aspect == pytest.approx(2)
+    for corners in ([0, 2, 1, 3], [0, 1, 2, 2], [3, 2, 1, 0]):
+        with pytest.raises(ValueError, match="counter-clockwise"):
+            drain(conformal_rectangle(V, F, np.array(corners)))

@@ -321,3 +321,22 @@ def test_maps_are_one_to_one_where_no_place_is_covered_twice(shifts, sound, mirr
         monkeypatch.setattr(embedding, "MOST_WINDINGS", 0)
         near = any(np.abs(np.subtract(a, b)).max() < 0.5 for k, a in enumerate(shifts) for b in shifts[:k])
         assert embedding._is_embedding(T, uv, edges, turned) == (not near)
+
+
+@pytest.mark.parametrize("inner", [0.4, 0.9])
+def test_what_lies_within_another_island_is_found_by_how_the_outline_winds(inner, monkeypatch):
+    T, uv = squares((0, 0), (9, 9))
+    uv[2:] = (uv[2:] - 9) * inner + (1 - inner) / 2
+    turned = np.zeros(len(T), bool)
+    assert not embedding._is_embedding(T, uv, embedding._edges(T, turned), turned)
+    # A frame around an island: its outline winds around the inside once there and once back.
+    ring = np.array([[0.0, 0], [9, 0], [9, 9], [0, 9], [3, 3], [6, 3], [6, 6], [3, 6]])
+    frame = np.array(
+        [[k, (k + 1) % 4, 4 + (k + 1) % 4] for k in range(4)] + [[k, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
+    )
+    T, corners = np.concatenate([frame, T[2:] - 4 + 8]), np.concatenate([ring[frame], uv[2:] + 4])
+    turned = np.zeros(len(T), bool)
+    edges = embedding._edges(T, turned)
+    assert embedding._is_embedding(T, corners, edges, turned)
+    monkeypatch.setattr(embedding, "MOST_WINDINGS", 3)
+    assert not embedding._is_embedding(T, corners, edges, turned)

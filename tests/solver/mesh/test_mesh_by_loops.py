@@ -341,3 +341,28 @@ def test_boundary_vertices_lie_on_one_another_where_parts_touch():
     assert repair.coincident_boundary_vertices(made, gluing, component, np.ones(2, bool)) == 4
     assert repair.coincident_boundary_vertices(made, gluing, 0 * component, np.ones(1, bool)) == 0
     assert repair.coincident_boundary_vertices(made, gluing, 0 * component, np.zeros(1, bool)) == 4
+
+
+@pytest.mark.parametrize("rounds", [0, 1, 2, 3, 4, 9])
+def test_edges_that_want_to_flip_do_so_in_rounds_the_worst_first(rounds):
+    """A fan of five triangles, 0 | 1 | 2 | 3 | 4: the edges between them wait for those in the same triangles."""
+    triangles = np.array([[0, k, k + 1] for k in range(1, 6)])
+    twin = topology.twins(triangles)
+    score = {frozenset((0, k)): -float(k) for k in range(2, 6)}
+    flipped, asked = [], []
+
+    def violation(edges):
+        tail, head = triangles.ravel()[edges], triangles[:, [1, 2, 0]].ravel()[edges]
+        ends = [frozenset((int(a), int(b))) for a, b in zip(tail, head, strict=True)]
+        asked.append(set(ends))
+        return np.array([0.0 if e in flipped else score.get(e, 1.0) for e in ends])
+
+    def flip(edges):
+        tail, head = triangles.ravel()[edges], triangles[:, [1, 2, 0]].ravel()[edges]
+        flipped.extend(frozenset((int(a), int(b))) for a, b in zip(tail, head, strict=True))
+
+    count, ended = edge_flips.flip_until_none(twin, violation, flip, rounds)
+    # 5 is worse than 4, which waits and is then alone beside 3; so are 3 and 2.
+    order = [frozenset((0, k)) for k in (5, 4, 3, 2)]
+    assert flipped == order[: min(rounds, 4)] and count == min(rounds, 4) and ended == (rounds > 4)
+    assert not asked or asked[0] == set(order)
