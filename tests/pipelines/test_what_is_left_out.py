@@ -110,3 +110,19 @@ def test_surfaces_without_a_pin_are_unwrapped_as_if_nobody_had_pinned_anything(p
     full = [value for value in vars(job.target).values() if isinstance(value, np.ndarray)]
     assert full[0][[0, 2]].tolist() == [1, 1] and full[0][3] > full[0][1] and full[1].tolist() == [0, 0, 0, 1]
     assert boundary != "own"
+
+
+@pytest.mark.parametrize(
+    ("pinned", "keeps", "fixed"), [(0, False, False), (1, False, False), (2, False, True), (0, True, True)]
+)
+def test_two_pins_fix_how_large_an_island_is(pinned, keeps, fixed, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        refinement, "refine_island", lambda *mesh, **given: asked.append(given["pins"]) or done("found")
+    )
+    V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    one = SimpleNamespace(chart=SimpleNamespace(vertices=V, triangles=F, faces=np.zeros(1, int)), uv=V[:, :2])
+    pins = SimpleNamespace(vertices=np.arange(pinned), places=V[:pinned, :2]) if pinned else None
+    settings = SimpleNamespace(keep_boundary=keeps, balance=0.5, quality="draft")
+    assert told(refinement._improve(one, pins, settings, None))[0] == (fixed, "found")
+    assert (asked[0] is None) == (not pinned and not keeps)

@@ -24,9 +24,11 @@ from omt_uv.solver.mesh.surface import degenerate_triangles
 from omt_uv.solver.parameterization import chart_indices, polygon_corners
 from omt_uv.solver.remeshing.components import component_batch
 from omt_uv.solver.remeshing.edits import long_edges
+from omt_uv.solver.remeshing.initial import component_maps
 from omt_uv.solver.seams.cut_tree import Cut
 from omt_uv.solver.sphere import conformal as sphere_conformal
 from omt_uv.solver.sphere import symmetry as sphere_symmetry
+from omt_uv.solver.strain import figures as strain_figures
 from omt_uv.solver.transfer import correspondence
 
 # Just within a bound, and just beyond it.
@@ -334,3 +336,35 @@ def test_islands_laid_side_by_side_have_room_between_them():
     # The higher one first; what is wider than the row begins a new one.
     gap = 0.01 * np.sqrt(5)
     assert found[4:].min(axis=0).tolist() == [0, 0] and found[:4].min(axis=0) == pytest.approx([0, 2 + gap])
+
+
+def test_ratios_are_the_greater_over_the_lesser_up_to_a_bound_and_one_of_nothing():
+    a, b = np.array([2.0, 1, 0, 0, 1e9, 3]), np.array([1.0, 2, 0, 1, 1, 3])
+    most = strain_figures.MOST
+    assert strain_figures._ratio(a, b).tolist() == [min(2, most), min(2, most), 1, most, most, 1]
+
+
+@pytest.mark.parametrize(
+    ("small", "lines", "kinds"),
+    [
+        ([1, 1, 0, 0], [0, 0, 0, 0], [[0, 1]]),
+        ([1, 0, 0, 0], [0, 0, 0, 0], []),
+        ([1, 1, 0, 0], [0, 1, 0, 0], []),
+        ([1, 1, 1, 1], [0, 1, 0, 1], [[0, 2], [1, 3]]),
+        ([1, 1, 1, 0], [0, 1, 0, 1], [[0, 2]]),
+    ],
+)
+def test_small_components_are_mapped_together_with_those_that_have_lines_or_have_none(small, lines, kinds, monkeypatch):
+    made = []
+    monkeypatch.setattr(component_maps, "batched", lambda components: [c.name for c in components])
+    monkeypatch.setattr(component_maps, "refine_for_maps", lambda batch: batch)
+    monkeypatch.setattr(component_maps, "ComponentMaps", lambda batch: made.append(batch) or ("batch", *batch))
+    components = [SimpleNamespace(name=k, has_lines=bool(line)) for k, line in enumerate(lines)]
+    own = SimpleNamespace(components=SimpleNamespace(components=components), maps=list("abcd"), _batches={})
+    class_ = next(c for c in vars(component_maps).values() if hasattr(c, "maps_with_batches"))
+    for _ in range(2):
+        found = class_.maps_with_batches(own, np.array(small, bool))
+        alone = [m for k, m in enumerate("abcd") if not any(k in kind for kind in kinds)]
+        assert found == [*alone, *(("batch", *kind) for kind in kinds)]
+    # What is known is not made again.
+    assert made == kinds
