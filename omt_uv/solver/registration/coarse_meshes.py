@@ -81,7 +81,7 @@ def far_vertices(vertices: np.ndarray, first: np.ndarray, loop: np.ndarray, coun
     first = np.unique(first)
     if len(loop):
         first = np.union1d(first, loop[:: max(1, len(loop) // max(12, int(np.sqrt(count))))])
-    chosen = first.tolist() or [0]
+    chosen = first.tolist()
     distance = np.full(len(vertices), np.inf)
     for vertex in chosen:
         np.minimum(distance, ((vertices - vertices[vertex]) ** 2).sum(axis=1), out=distance)

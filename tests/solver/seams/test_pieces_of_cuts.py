@@ -182,3 +182,23 @@ def test_seams_are_searched_where_a_component_is_curved_and_wanted(wants, monkey
     assert found.tolist() == [wants, wants, False] and asked == [([5], False), ([6, 7], True)]
     own.search = None
     assert class_._to_search(own, component_at, None, members).tolist() == [False] * 3
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+def test_what_is_held_already_answers_with_nothing_but_rounding(scale):
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(6, 6))
+    green = scale * (root @ root.T + np.eye(6))
+    held = predicted_scale.Held.of(green, rng.normal(size=6))
+    free = held.between(np.array([2]))
+    assert free[0, 0] == pytest.approx(green[2, 2])
+    again = held.at(np.array([2, 4])).between(np.array([2, 4]))
+    least = predicted_scale.LEAST_ROUNDING * np.diag(green)[[2, 4]]
+    assert (np.diag(again) >= least).all() and (np.diag(again) < 1e-6 * np.diag(green)[[2, 4]]).all()
+    one = held.at(np.array([2])).between(np.array([2]))
+    assert one[0, 0] >= least[0] and one[0, 0] < 1e-6 * green[2, 2]
+    # Several together are loosened a little, each by itself and by the greatest.
+    both = held.between(np.array([1, 3]))
+    own = np.diag(green)[[1, 3]]
+    more = predicted_scale.ROUNDING * own + predicted_scale.LEAST_ROUNDING * own.max()
+    np.testing.assert_allclose(both - green[np.ix_([1, 3], [1, 3])], np.diag(more), atol=1e-9 * own.max())
