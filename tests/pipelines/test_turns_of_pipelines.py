@@ -517,7 +517,7 @@ def test_areas_that_nearly_do_get_there_with_a_little_more_weight(errors, kept, 
 # ---- what is carried on to another mesh ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("weight", "across"), [(-1.1e-9, True), (-0.9e-9, False), (0.5, False)])
+@pytest.mark.parametrize(("weight", "across"), [(-1.1e-9, True), (-1e-9, False), (-0.9e-9, False), (0.5, False)])
 def test_corners_beyond_their_triangle_are_continued(weight, across):
     weights = np.full((2, 3, 3), 1 / 3)
     weights[1, 2, 0] = weight

@@ -74,8 +74,7 @@ def sampled(levels: Sequence[np.ndarray], uv: np.ndarray, pixels: np.ndarray, re
     for k, picture in enumerate(levels):
         weight = np.where(lower == k, 1 - (level - lower), np.where(lower + 1 == k, level - lower, 0))
         mine = np.flatnonzero(weight > 0)
-        if len(mine):
-            result[mine] += weight[mine, None] * bilinear(picture, uv[mine], _pixels(picture, repeat))
+        result[mine] += weight[mine, None] * bilinear(picture, uv[mine], _pixels(picture, repeat))
     return result
 
 

@@ -10,6 +10,7 @@ from sphere_shapes import lopsided, random_rotation, random_sphere
 from omt_uv.solver.mesh.spherical_geometry import spherical_areas
 from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
+from omt_uv.solver.sphere import moser_flow
 from omt_uv.solver.sphere.moser_flow import advect_points, edge_fluxes, moser_map
 
 
@@ -69,3 +70,17 @@ def test_moser_turns_with_the_sphere():
     assert np.allclose(
         drain(moser_map(P @ R.T, F, mass)).positions, drain(moser_map(P, F, mass)).positions @ R.T, atol=1e-9
     )
+
+
+@pytest.mark.parametrize("most", [0, 1, 3])
+def test_points_that_cross_too_many_faces_are_counted(most, monkeypatch):
+    P, F = random_sphere(100)
+    first, last = lopsided(P, F), spherical_areas(P, F)
+    flux = edge_fluxes(P, F, first - last)
+    start, middle = np.arange(len(F)), np.full((len(F), 3), 1 / 3)
+    whole = drain(advect_points(F, flux, first, last, start, middle))
+    monkeypatch.setattr(moser_flow, "CROSSINGS", most)
+    face, weights, rounds, stuck = drain(advect_points(F, flux, first, last, start, middle))
+    assert rounds == most < whole[2] and whole[3] == 0 < stuck <= len(F)
+    assert stuck == len(F) or most > 0
+    assert most > 0 or (np.array_equal(face, start) and np.array_equal(weights, middle))
