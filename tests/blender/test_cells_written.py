@@ -112,3 +112,16 @@ def test_shape_keys_are_relative_to_that_of_the_object(package, there):
         np.testing.assert_allclose(found, base + key.offsets @ inverse.T, atol=1e-6)
     assert blocks["Smile"].value == 0.25 and blocks["Smile"].mute and not blocks["Wide"].mute
     assert blocks["Smile"].relative_key == blocks[0] and blocks["Wide"].relative_key == blocks["Smile"]
+
+
+@pytest.mark.parametrize("width, data_type", [((), "FLOAT"), ((3,), "FLOAT_VECTOR")])
+def test_a_layer_that_is_there_is_written_and_none_beside_it(package, width, data_type):
+    write, attributes = package("blender.write_attributes"), package("pipelines.attributes")
+    mesh = scenes.cube().data
+    for of in (1.0, 2.0):
+        values = np.full((8, *width), of, np.float32)
+        write.write_layer(mesh, attributes.Layer("mine", "POINT", data_type, values))
+        assert [a.name for a in mesh.attributes if a.name.startswith("mine")] == ["mine"]
+        found = np.zeros(values.size, np.float32)
+        mesh.attributes["mine"].data.foreach_get("vector" if width else "value", found)
+        assert (found == of).all()

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from omt_uv.display import histogram, preview, raster
+from omt_uv.display import canvas, histogram, preview, raster
 from omt_uv.display.textures import layouts, patterns, world
 
 
@@ -287,3 +287,45 @@ def test_layouts_show_each_polygon_in_its_colour(kind):
 def test_what_stands_for_rounding_moves_no_end(reached, end):
     octaves = np.concatenate([np.zeros(50), np.full(50, reached)])
     assert histogram._reach(octaves, np.ones(100), 2) == end
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    "corner",
+    [
+        [(1.5, 0.5), (9.2, 3.1), (3.3, 8.7)],
+        [(0, 0), (8, 0), (0, 8)],
+        [(-3.5, -2), (6, 4), (2, 9)],
+        [(2, 2), (30, 5), (5, 30)],
+        [(1, 4), (5, 4), (9, 4)],
+    ],
+)
+def test_samples_inside_a_triangle_are_set_and_no_others(corner, turned):
+    corner = np.array(corner[::-1] if turned else corner, float)
+    fine, before = np.zeros((12, 14), bool), np.zeros((12, 14), bool)
+    before[11, 13] = fine[11, 13] = True
+    canvas._fill(fine, corner)
+    for y in range(12):
+        for x in range(14):
+            a = [np.linalg.det([corner[(k + 1) % 3] - corner[k], (x, y) - corner[k]]) for k in range(3)]
+            # One of no area is the line between its ends.
+            between = (corner.min(0) <= (x, y)).all() and ((x, y) <= corner.max(0)).all()
+            expected = between and (min(a) >= -1e-9 or max(a) <= 1e-9)
+            assert fine[y, x] == (expected or before[y, x]), (x, y)
+
+
+def test_coverage_of_a_text_is_that_of_its_samples(monkeypatch):
+    points, triangles = np.array([[0.1, -0.2], [1.3, 0.1], [0.6, 0.9]]), np.array([[0, 1, 2]])
+    monkeypatch.setattr(canvas, "_outline", lambda _: (points, triangles))
+    coverage, left, top = canvas._text.__wrapped__("of a test", 10.0)
+    # From 1 to 13 and from -2 to 9, in pixels.
+    assert (left, top, coverage.shape) == (1.0, 9.0, (11, 12))
+    assert coverage.sum() == pytest.approx(50 * np.cross([1.2, 0.3, 0], [0.5, 1.1, 0])[2], rel=0.02)
+    for row in range(11):
+        for column in range(12):
+            share = 0
+            for y in (np.arange(4) + 0.5) / 4 + 9 - row - 1:
+                for x in (np.arange(4) + 0.5) / 4 + 1 + column:
+                    p = 10 * points
+                    share += all(np.linalg.det([p[(k + 1) % 3] - p[k], (x, y) - p[k]]) >= 0 for k in range(3))
+            assert coverage[row, column] == share / 16

@@ -47,3 +47,12 @@ def test_preferences_as_they_come_change_no_operator(package, chosen):
         for setting in module.DEFAULTS:
             if setting in last.bl_rna.properties:
                 assert getattr(last, setting) == last.bl_rna.properties[setting].default, (name, setting)
+
+
+def test_operators_that_are_not_there_are_left_out(package, chosen, monkeypatch):
+    """Those of a version of Blender that lacks what they need are not registered."""
+    module = package("panels.preferences")
+    monkeypatch.setattr(module, "OPERATORS", ("UV_OT_omt_of_no_such_name", *module.OPERATORS))
+    chosen.margin = 11
+    module.apply(chosen, bpy.context)
+    assert last_of("UV_OT_omt_unwrap").margin == 11

@@ -60,19 +60,18 @@ class LaplacianSolver:
     """Solves with one Laplacian after the other, each a little different: a hierarchy serves until it is slow."""
 
     def __init__(self):
-        self._hierarchy: Multigrid | None = None
-        self._most = 0.0
+        # The hierarchy that serves, and with how many cycles it still does.
+        self._serving: tuple[Multigrid, float] | None = None
 
     def solve(self, A: sp.csr_matrix, b: np.ndarray, scale: np.ndarray, tolerance: float) -> np.ndarray:
         """Solve A x = b (n,), A and its unknowns as in `Multigrid`; the mean of x is 0.
 
         Ends at max(|b - A x| / scale) <= tolerance max(|b| / scale), scale (n,) > 0. Raises PrecisionError.
         """
-        hierarchy = self._hierarchy or Multigrid(A)
+        hierarchy, most = self._serving or (Multigrid(A), None)
         x, cycles = _by_gradients(A, b - b.mean(), scale, tolerance, hierarchy)
-        if self._hierarchy is None:
-            self._most = SLOWER * cycles
-        self._hierarchy = hierarchy if cycles <= self._most else None
+        most = SLOWER * cycles if most is None else most
+        self._serving = (hierarchy, most) if cycles <= most else None
         return x - x.mean()
 
 

@@ -540,3 +540,26 @@ def test_what_other_meshes_name_is_not_owned(monkeypatch):
     users[2] = 2
     glb._write_group(change, parts)
     assert found[1][-1] == {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_uvs_of_vertices_are_as_wide_as_the_file_says(order):
+    """The first of a vertex's numbers, and both of its UV, are of three kinds."""
+    name = b"little" if order == "<" else b"big"
+    header = (
+        b"ply\nformat binary_%s_endian 1.0\nelement vertex 3\nproperty short flag\nproperty float x\nproperty float y\n"
+        b"property float z\nproperty double s\nproperty float t\nelement face 1\n"
+        b"property list uchar int vertex_indices\nend_header\n"
+    ) % name
+    places, uv = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
+
+    def data(uv):
+        rows = [struct.pack(order + "hfffdf", 7 + k, *places[k], *uv[k]) for k in range(3)]
+        return header + b"".join(rows) + struct.pack(order + "B3i", 3, 0, 1, 2)
+
+    mesh, old = ply.read_uv(data(uv))
+    np.testing.assert_allclose(old, uv, atol=1e-7)
+    wished = np.array([[0.25, 0.75], [0.5, 0.4375], [0.125, 0.625]], np.float32)
+    split = ply.Split(np.arange(3), np.zeros(0, int), np.ones(3, bool), wished)
+    rows = ply._binary_vertices(mesh, split, old)
+    assert rows == data(wished)[len(header) : len(header) + len(rows)] and len(rows) == 3 * 26

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.analysis import seam_costs
 from omt_uv.solver.analysis.curvature import mean_curvature
 from omt_uv.solver.analysis.facing import ahead, salient_weights, towards
 from omt_uv.solver.analysis.feature_edges import edge_union, fold_angles, sharp_edges, value_jumps
@@ -173,3 +175,46 @@ def _in_own_axes(V, F, got):
     middle = np.array([V[F[(v == F).any(axis=1)]].mean(axis=(0, 1)) for v in range(7, 13)]) @ axes
     signs = np.array(np.meshgrid([1, -1], [1, -1], [1, -1])).reshape(3, -1).T
     return any(np.array_equal(got, 7 + np.lexsort((middle * s).T)) for s in signs)
+
+
+def smooth(value, low, high):
+    t = min(max((value - low) / (high - low), 0.0), 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def test_reasons_of_vertices_are_steps_between_their_bounds(monkeypatch):
+    """Vertex by vertex, on either side of every bound and between the two."""
+    V, F = meshes.icosphere(2)
+    n, rng = len(V), np.random.default_rng(3)
+    occlusion, forwards, below, within = rng.random(n), *rng.uniform(-0.2, 1, (3, n))
+    curvature, sure = rng.uniform(-30, 5, n), 0.8
+    seen = SimpleNamespace(front=np.array([1.0, 0, 0]), up=np.array([0, 0, 1.0]), certainty=0.9)
+    fixed = {
+        "hidden_sides": lambda *_: None,
+        "outside_out": lambda _, triangles, __: triangles,
+        "curvature_means": lambda *_: {seam_costs.CREASE_SCALE: curvature},
+        "saliency_of": lambda *_: None,
+        "facing": lambda *_: seen,
+        "vertex_occlusion": lambda *_: occlusion,
+        "with_a_face": lambda *_: sure,
+        "towards": lambda *of: forwards if of[2][0] > 0 else below,
+        "ahead": lambda *_: within,
+        "salient_weights": lambda *_: np.ones(n),
+    }
+    for name, what in fixed.items():
+        monkeypatch.setattr(seam_costs, name, what)
+    _, reasons = seam_costs._vertex_reasons(V, F, None, None)
+    for v in range(n):
+        front = smooth(0.9 * sure * forwards[v], 0.1, 0.6) * (1 - smooth(occlusion[v], 0.5, 0.9))
+        hidden = smooth(occlusion[v], 0.05, 0.5) * (1 - front)
+        expected = {
+            "hidden": hidden,
+            "crease": smooth(-curvature[v], 4, 20) * (1 - front),
+            "underside": smooth(below[v], 0.1, 0.6),
+            "back": smooth(-0.9 * forwards[v], 0.1, 0.6),
+            "front": front,
+            "salient": 1 - hidden,
+            "mirror": 0,
+            "face": max(front, smooth(0.9 * sure * within[v], 0.1, 0.6)),
+        }
+        assert {name: reason[v] for name, reason in reasons.items()} == pytest.approx(expected, abs=1e-12)
