@@ -78,7 +78,7 @@ def test_what_can_be_unrolled_is_unless_it_touches_itself(first):
 
 
 def test_drafts_are_flattened_where_they_are_small(first):
-    above = chart_maps.COARSE_ABOVE
+    above = 5000
     assert first(draft=True, even="even", size=above)[:2] == ("even", ["unroll", "even"])
     assert first(draft=True, size=above)[1][:2] == ["unroll", "even"]
     assert "even" not in first(draft=True, even="even", size=above + 1)[1]
@@ -93,7 +93,7 @@ def test_others_get_room_or_are_evened(first):
 
 @pytest.mark.parametrize("draft", [False, True])
 def test_large_charts_come_by_way_of_coarser_ones(draft, first):
-    above = chart_maps.DRAFT_ABOVE if draft else chart_maps.COARSE_ABOVE
+    above = 600 if draft else 5000
     assert not [t for t in first(draft=draft, size=above)[1] if t.startswith("coarse")]
     found, tried, told = first(draft=draft, size=above + 1, coarse="coarse")
     assert found == "coarse" and tried[-1] == f"coarse {draft}" and not told
