@@ -133,7 +133,7 @@ def _topology(coarse: Cage) -> _Topology:
     sharpness[faces_at != 2] = SHARP
     return _Topology(
         ends=ends,
-        edge=edge.ravel(),
+        edge=edge,
         face=np.repeat(np.arange(len(sides)), sides),
         following=following,
         faces_at=faces_at,

@@ -223,3 +223,18 @@ def test_pictures_without_a_pinch_are_as_wide_as_the_parallel():
     latitude = np.arcsin(points[:, 2])
     np.testing.assert_allclose(flat[:, 1], even[:, 1])
     np.testing.assert_allclose(flat[:, 0] - 0.5, (even[:, 0] - 0.5) * np.cos(latitude), atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 7])
+def test_centres_of_equal_triangles_are_one_in_each(n):
+    """All triangles between three neighbours of the grid, n cuts a side."""
+    grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
+    cells = []
+    for i, j in grid:
+        for corners in ([(i, j), (i + 1, j), (i, j + 1)], [(i, j), (i - 1, j), (i, j - 1)]):
+            if all(corner in grid for corner in corners):
+                cells.append(np.mean(corners, axis=0) / n)
+    found = exact_areas._grid_cells(n)
+    assert len(found) == len(cells) == n * n
+    np.testing.assert_allclose(found.sum(axis=1), 1)
+    assert sorted(map(tuple, found[:, :2].round(9))) == sorted(map(tuple, np.round(cells, 9)))
