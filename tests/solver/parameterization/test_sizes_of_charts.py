@@ -142,7 +142,7 @@ def test_meshes_are_coarsened_by_a_factor_and_only_where_it_pays(far, draft, goa
         monkeypatch.setattr(initial_map, name, lambda *_, name=name: reached(name))
     for more in (-1, 0, 1, 2):
         kept = again + more
-        disk = sized(count + (4 if more == 2 else 0), is_far=far)
+        disk = sized(count + (8 if more == 2 else 0), is_far=far)
         steps = initial_map._coarse_initial_map(disk, 0.0, RunLog(), np.zeros((len(disk.vertices), 2)), draft, True)
         try:
             found = drain(steps) or "none"
@@ -151,7 +151,7 @@ def test_meshes_are_coarsened_by_a_factor_and_only_where_it_pays(far, draft, goa
         direct = "_draft_start" if draft else "direct_initial_map"
         pays = kept <= enough * len(disk.vertices)
         assert found == ("none" if not pays else direct if more <= 0 else "coarse_initial_map")
-    assert asked == [count // goal] * 3 + [(count + 4) // goal]
+    assert asked == [count // goal] * 3 + [(count + 8) // goal]
 
 
 @pytest.mark.parametrize("apart, usable", [(0.9e-7, False), (1.1e-7, True)])
