@@ -1,5 +1,7 @@
 """Patches whose corners become convex, each for itself."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,81 @@ def test_costs_are_what_the_figures_of_the_whole_lose():
     )
     costs = patches._costs(w, grown)
     assert costs[first] == pytest.approx(0.21 * given.areas(w)[0] - loss) and costs[second] == 0
+
+
+def scripted_patches(lacking, reflex):
+    """Patches whose maps are numbers of rounds: what corners lack after each, and which corners are reflex then."""
+    taken = []
+
+    def stepped(w, weight, strength):
+        taken.append(strength.tolist())
+        return w + 1
+
+    return taken, SimpleNamespace(
+        strength=np.array([30.0, 30.0]),
+        area_weight=None,
+        corners=SimpleNamespace(reflex=reflex),
+        _lacking=lambda w, _: lacking(w),
+        _barrier=lambda w, strength: strength,
+        _stepped=stepped,
+    )
+
+
+@pytest.mark.parametrize("kept, rounds", [(0.94, 48), (0.96, 12), (1.0, 12)])
+def test_rounds_go_on_while_they_bring_what_is_worth_it(kept, rounds):
+    """The first dozen in any case, and no more than four dozens."""
+    taken, patches = scripted_patches(lambda w: kept**w, lambda w: np.array([True, w < 3]))
+    assert CornerPatches._forced_anew(patches, 0) == rounds == len(taken)
+    assert taken == [[30.0 * 2**k, 30.0 * 2 ** min(k, 3)] for k in range(rounds)]
+
+
+@pytest.mark.parametrize("rounds", [0, 1, 30])
+def test_rounds_end_once_no_corner_is_reflex(rounds):
+    taken, patches = scripted_patches(lambda w: 0.5**w, lambda w: np.array([False, w < rounds]))
+    assert CornerPatches._forced_anew(patches, 0) == rounds == len(taken)
+
+
+@pytest.mark.parametrize(
+    "errors, weights, strengths",
+    [
+        # An error that is a quarter greater, and a little more: from the third round on the area weighs more.
+        (1.25, [2, 2, 2, 2], [30, 3, 0.3, 0.03]),
+        (1.26, [2, 2, 3, 4.5], [30, 3, 0.3, 0.03]),
+    ],
+)
+def test_the_barrier_weakens_and_areas_weigh_more_where_they_suffer(errors, weights, strengths):
+    taken, one = [], np.zeros(1, int)
+
+    def stepped(w, weight, strength):
+        taken.append((float(weight[0]), float(strength[0])))
+        return w + 1
+
+    patches = SimpleNamespace(
+        strength=np.array([30.0]),
+        area_weight=np.array([2.0]),
+        of_face=one,
+        of_vertex=one,
+        chart=one,
+        spare=np.array([1.0]),
+        _forced=lambda w: w,
+        _symmetric=lambda w: w,
+        _area_errors=lambda w: np.array([errors if w[0] else 1.0]),
+        _reflex_count=lambda w: np.array([0 if w[0] else 2]),
+        _barrier=lambda w, strength: strength,
+        _stepped=stepped,
+        _costs=lambda given, w: np.array([0.5]),
+    )
+    given = np.zeros(1)
+    # Forced, it has no reflex corner any more.
+    patches._forced = lambda w: w + 1
+    assert CornerPatches.convexified(patches, given) == [5]
+    assert [w for w, _ in taken] == weights and [s for _, s in taken] == pytest.approx(strengths)
+    # What costs more than can be spared goes on, and is not taken.
+    taken.clear()
+    patches._costs = lambda given, w: np.array([1.5])
+    assert CornerPatches.convexified(patches, given) is not given and len(taken) == 12
+    assert CornerPatches.convexified(patches, given) == [0]
+    # Where no corner is the better for it, nothing is tried.
+    taken.clear()
+    patches._forced = lambda w: w
+    assert CornerPatches.convexified(patches, given) is given and not taken
