@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -110,3 +112,18 @@ def test_blocks_of_followers_are_those_of_their_representatives():
             np.add.at(dense, (place, 2 * vertices[:, k, None] + axis), part)
     dense *= free.ravel()
     np.testing.assert_allclose(matrix.toarray(), dense.T @ dense, atol=1e-12 * found.scale)
+
+
+@pytest.mark.parametrize("n", [6, 7, 18, 19, 400])
+def test_corners_are_added_at_their_vertices_among_few_and_among_many(n):
+    """Three triangles, nine corners: up to twice as many vertices all are summed, and the same is found beyond."""
+    rng = np.random.default_rng(n)
+    T = np.array([[5, 0, 2], [2, 0, n - 1], [n - 1, 3, 5]])
+    corner = rng.normal(size=(3, 3)) + 1j * rng.normal(size=(3, 3))
+    total = rng.normal(size=n) + 1j * rng.normal(size=n)
+    expected = total.copy()
+    for triangle, values in zip(T, corner, strict=True):
+        for vertex, value in zip(triangle, values, strict=True):
+            expected[vertex] += value
+    hessian_blocks_module._add_at_vertices(total, SimpleNamespace(triangles=T), corner)
+    np.testing.assert_allclose(total, expected, rtol=1e-13)
