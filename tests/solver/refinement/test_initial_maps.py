@@ -1,5 +1,7 @@
 """Initial maps: no folds, the boundary where it shall be, and nothing replaced without a warning."""
 
+import contextlib
+
 import hard_meshes
 import meshes
 import numpy as np
@@ -166,3 +168,77 @@ def test_turns_of_a_square_are_told_by_one_system(failing, monkeypatch):
         monkeypatch.setattr(initial_maps, "map_energy", lambda uv, V, F: np.inf)
     found = [energy for _, energy in initial_maps._attempts(mesh, several, half, [])]
     assert len(found) == (8 if failing else 2) and (failing or min(found) == min(every))
+
+
+@pytest.mark.parametrize("of_start, of_fresh, taken", [(1.99, 1.0, "start"), (2.01, 1.0, "fresh"), (9.0, 9.0, "start")])
+def test_a_squeezed_start_gives_way_to_a_mean_value_map_that_is_less_so(of_start, of_fresh, taken, monkeypatch):
+    V, F = MESHES["cap"]
+    loop, starts = boundary_loops(F)[0], []
+    start = initial_maps.disk_initial_map(V, F, V[:, :2], loop)
+    monkeypatch.setattr(initial_maps, "disk_initial_map", lambda *_: start)
+    monkeypatch.setattr(initial_maps, "unroll", lambda *_: None)
+    monkeypatch.setattr(initial_maps, "count_folds", lambda *_: 1)
+    monkeypatch.setattr(
+        initial_maps, "map_energy", lambda uv, *_: (starts.append(uv), of_start if uv is start.uv else of_fresh)[1]
+    )
+    found = free_initial_map(V, F, V[:, :2], loop)
+    assert found.may_cross and (found.uv is start.uv) == (taken == "start") and len(starts) == 1 + (of_start > 2)
+    radius = np.sqrt(face_areas(V, F).sum() / np.pi)
+    if taken == "fresh":
+        np.testing.assert_allclose(np.linalg.norm(found.uv[loop], axis=1), radius)
+
+
+@pytest.mark.parametrize("share, refused", [(0.049, True), (0.051, False)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_maps_whose_sides_nearly_cancel_are_refused(share, refused, sign):
+    """Two triangles, one of them upside down."""
+    least = (1 - share) / 2
+    uv = np.array([[0, 0], [1, 0], [0, sign], [0, 0], [1, 0], [0, -sign * least / (1 - least)]])
+    faces = np.arange(6).reshape(2, 3)
+    if not refused:
+        check_initial_map(uv, faces)
+        return
+    with pytest.raises(FoldedUVError, match="beyond repair") as told:
+        check_initial_map(uv, faces)
+    assert told.value.elements.tolist() == [1]
+
+
+@pytest.mark.parametrize("height, refused", [(1.9e-12, True), (2.1e-12, False)])
+def test_maps_of_no_area_are_refused_in_any_unit(height, refused):
+    """A triangle twice as high as the share of its extent's square that is its area."""
+    for unit in (1e-6, 1.0, 1e6):
+        uv = unit * np.array([[0, 0], [1, 0], [0.5, height]])
+        with pytest.raises(FoldedUVError, match="have no area") if refused else contextlib.nullcontext():
+            check_initial_map(uv, np.array([[0, 1, 2]]))
+
+
+@pytest.mark.parametrize("entropy, far", [(0.499, False), (0.501, True)])
+def test_targets_are_far_from_half_a_nat_on(entropy, far, monkeypatch):
+    monkeypatch.setattr(initial_maps, "relative_entropy", lambda *_: entropy)
+    assert is_far(np.ones(2), np.ones(2)) == far
+
+
+def test_the_middle_of_an_outline_is_its_centroid_wherever_its_vertices_crowd():
+    wide = np.array([[0.0, 0], [4, 0], [4, 2], [0, 2]])
+    crowded = np.concatenate([wide[:1], np.column_stack([np.linspace(0.01, 0.5, 30), np.zeros(30)]), wide[1:]])
+    for outline in (wide, crowded, crowded[::-1], np.roll(crowded, 7, axis=0)):
+        np.testing.assert_allclose(initial_maps._middle(outline + [100, -30]), [102, -29])
+
+
+@pytest.mark.parametrize("left, of_area", [(0.99e-3, False), (1.01e-3, True)])
+def test_an_outline_that_encloses_hardly_anything_has_the_mean_of_its_vertices(left, of_area):
+    """A bow tie: what the one half encloses the other one takes away, but for a share of both."""
+    other = (1 - left) / (1 + left)
+    outline = np.array([[0.0, 0], [1, 1], [1, -1], [0, 0], [-1, other], [-1, -other]])
+    mean = np.allclose(initial_maps._middle(outline), outline.mean(axis=0))
+    assert mean != of_area
+
+
+@pytest.mark.parametrize("short, second", [(0.9e-6, 1), (1.1e-6, 2)])
+def test_of_two_that_are_about_as_far_the_first_is_the_farthest(short, second):
+    V = np.array([[0.0, 0, 0], [1 - short, 0, 0], [0, 1, 0]])
+    one = np.array([[0, 1], [1, 2], [2, 0]])
+    first, far = initial_maps.farthest_from_first(
+        np.tile(V, (2, 1)), np.concatenate([one, one + 3]), np.repeat([0, 5], 3)
+    )
+    assert first.tolist() == [0, 3] and far.tolist() == [second, second + 3]
