@@ -63,13 +63,11 @@ def best(monkeypatch):
 
 def test_a_net_is_taken_that_is_short_by_itself_or_hardly_longer_than_other_cuts(best):
     assert best(length=50.0)[:2] == ("net", ["net"])
-    found, tried, net = best(length=50.0 + 1e-9, other=50.0 / cuts.LONGER + 1e-3)
+    found, tried, net = best(length=50.0 + 1e-9, other=50.0 / 1.5 + 1e-3)
     assert (
-        found == "net"
-        and tried == ["net", "cut 6 outline"]
-        and net.asked == pytest.approx([50.0, 50.0 + cuts.LONGER * 1e-3])
+        found == "net" and tried == ["net", "cut 6 outline"] and net.asked == pytest.approx([50.0, 50.0 + 1.5 * 1e-3])
     )
-    assert best(length=60.0, other=59.0 / cuts.LONGER)[0] == "cut" and best()[:2] == ("cut", ["net", "cut 6 outline"])
+    assert best(length=60.0, other=59.0 / 1.5)[0] == "cut" and best()[:2] == ("cut", ["net", "cut 6 outline"])
 
 
 def test_what_is_searched_has_a_net_or_seams(best):
@@ -191,27 +189,27 @@ def symmetric(monkeypatch):
 
 def test_what_is_its_own_mirror_image_is_cut_alike_on_both_sides(symmetric):
     found, asked = symmetric()
-    assert found == "symmetric" and asked == [("half", 6, min(cuts.BEARABLE, cuts.STEEPER))]
+    assert found == "symmetric" and asked == [("half", 6, min(cuts.BEARABLE, 1.1))]
     assert symmetric(halves=False) == ("plain", []) and symmetric(found=False)[0] == "plain"
     # What is hardly steep is as good as flat.
-    assert symmetric(plain=0.0)[1][0][2] == pytest.approx(min(cuts.BEARABLE, cuts.STEEPER * cuts.UNSEEN))
+    assert symmetric(plain=0.0)[1][0][2] == pytest.approx(min(cuts.BEARABLE, 1.1 * cuts.UNSEEN))
     assert symmetric(plain=1e9)[1][0][2] == cuts.BEARABLE and symmetric(extremities=0)[1][0][2] == cuts.BEARABLE
 
 
 @pytest.mark.parametrize("spread", [0.5, 1.0, 1.44])
 @pytest.mark.parametrize(("share", "taken"), [(0.999, True), (1.001, False)])
 def test_symmetry_may_cost_so_much_more_and_less_where_it_is_steeper(share, taken, spread, symmetric):
-    cost = share * cuts.DEARER / np.sqrt(max(spread, 1.0))
+    cost = share * 1.5 / np.sqrt(max(spread, 1.0))
     assert symmetric(cost=cost, spread=spread)[0] == ("symmetric" if taken else "plain")
     # Without tips nothing is known of how steep it is.
-    assert symmetric(cost=share * cuts.DEARER, spread=spread, extremities=0)[0] == ("symmetric" if taken else "plain")
+    assert symmetric(cost=share * 1.5, spread=spread, extremities=0)[0] == ("symmetric" if taken else "plain")
 
 
 @pytest.mark.parametrize(("steeper", "taken"), [(0.999, True), (1.001, False)])
 def test_outlines_are_not_much_more_distorted(steeper, taken, symmetric):
-    found, asked = symmetric(outline=True, spread=steeper * cuts.STEEPER_OUTLINED, cost=0.1)
+    found, asked = symmetric(outline=True, spread=steeper * 1.5, cost=0.1)
     assert found == ("symmetric" if taken else "plain")
-    assert asked == [(["half", "other"], 6, min(cuts.BEARABLE, cuts.STEEPER_OUTLINED))]
+    assert asked == [(["half", "other"], 6, min(cuts.BEARABLE, 1.5))]
 
 
 @pytest.mark.parametrize(

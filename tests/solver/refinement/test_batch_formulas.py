@@ -88,7 +88,7 @@ def test_a_map_is_smoothed_where_it_is_tense_and_valid_before_and_after(
         return after
 
     monkeypatch.setattr(refinement, "smoothed", smoothed)
-    level = refinement.TENSE * (1.01 if tense else 0.99)
+    level = 3.0 * (1.01 if tense else 0.99)
     problem = SimpleNamespace(
         newton_problem=lambda *_: SimpleNamespace(energy=lambda _w: level),
         boundary_crosses=lambda w: crosses if w is before else ends_crossing,

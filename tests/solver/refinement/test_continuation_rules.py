@@ -60,7 +60,7 @@ def test_weights_fall_with_the_balance(name):
     quality = QUALITIES[name]
     assert rules.planned_weights(0.0, quality) == list(quality.area_weights)
     last = [rules.planned_weights(t, quality)[-1] for t in np.linspace(0, 1, 11)]
-    assert (np.diff(last) < 0).all() and last[-1] == pytest.approx(rules.LEAST_WEIGHT)
+    assert (np.diff(last) < 0).all() and last[-1] == pytest.approx(1e-2)
     for t in (0.0, 0.3, 1.0):
         assert (np.diff(rules.planned_weights(t, quality)) > 0).all()
 
@@ -68,7 +68,7 @@ def test_weights_fall_with_the_balance(name):
 def test_weights_grow_within_bounds_and_with_the_error():
     quality = QUALITIES["standard"]
     # What is missing, and a little more.
-    error = quality.area_error * np.array([0.5, 1, 1.5, 2, 3, 100]) / rules.MARGIN
+    error = quality.area_error * np.array([0.5, 1, 1.5, 2, 3, 100]) / 1.05
     grown = rules.next_weight(30.0, error, quality) / 30
     assert (np.diff(grown) >= 0).all()
     np.testing.assert_allclose(grown, [1.3, 1.3, 2.25, 4, 9, 10])
@@ -77,7 +77,7 @@ def test_weights_grow_within_bounds_and_with_the_error():
 def test_polygons_are_pressed_no_further_than_a_part_of_what_they_may_be_off():
     quality = QUALITIES["standard"]
     weight, planned = quality.area_weights
-    aim = rules.SPARE * quality.area_error
+    aim = 0.25 * quality.area_error
     error = np.array([0.1 * aim, 2 * aim, 1e3 * aim])
     # As the error falls with the weight: none less than the one before, none greater than what was planned.
     np.testing.assert_allclose(rules.spare_weight(planned, weight, error, quality), [weight, 2 * weight, planned])
@@ -109,7 +109,7 @@ def test_stages_on_the_way_end_sooner():
         assert there[0] == under_way[0]
     assert rules.stage_tolerances(quality, 0.0, True, early=True)[1] > quality.loose_tolerance
     assert rules.stage_tolerances(quality, 0.0, True, early=False)[1] == quality.loose_tolerance
-    assert rules.stage_tolerances(quality, 0.5, True, early=True) == (rules.STRICT, rules.LOOSE)
+    assert rules.stage_tolerances(quality, 0.5, True, early=True) == (1e-4, 3e-2)
 
 
 def test_a_goal_is_out_of_reach_where_steps_gain_less_than_is_missing():
@@ -146,9 +146,9 @@ def test_a_map_is_settled_where_a_whole_step_changes_neither_shear_nor_areas():
 
 def test_only_a_whole_step_that_kept_its_promise_leaves_less_than_it_promised():
     residual, left = rules.promised(DECREMENT, ENERGY), rules.left_over(ENERGY, SHARE, GAIN, DECREMENT)
-    assert (left <= residual).all() and (left >= rules.LEFT * residual).all()
+    assert (left <= residual).all() and (left >= 0.1 * residual).all()
     np.testing.assert_array_equal(left[SHARE < 1], residual[SHARE < 1])
-    np.testing.assert_array_equal(left[ENERGY > rules.EASY], residual[ENERGY > rules.EASY])
+    np.testing.assert_array_equal(left[ENERGY > 1.0], residual[ENERGY > 1.0])
     far = np.abs(GAIN - DECREMENT) > DECREMENT
     np.testing.assert_array_equal(left[far], residual[far])
     # Newton's method for the energy x^2 / 2 + c x^3: what is left to the next step is less than what is said.
@@ -163,9 +163,9 @@ def test_only_a_whole_step_that_kept_its_promise_leaves_less_than_it_promised():
 def test_only_free_boundaries_with_areas_about_right_begin_with_soft_areas():
     for name, soft in (("standard", True), ("draft", True), ("exact", False)):
         first = rules.first_pressure(QUALITIES[name], 0.0, True)
-        assert first == (rules.FREE_PRESSURE if soft else rules.FIRST_PRESSURE)
-    assert rules.first_pressure(QUALITIES["standard"], 0.5, True) == rules.FIRST_PRESSURE
-    assert rules.first_pressure(QUALITIES["standard"], 0.0, False) == rules.FIRST_PRESSURE
+        assert first == (0.05 if soft else 0.3)
+    assert rules.first_pressure(QUALITIES["standard"], 0.5, True) == 0.3
+    assert rules.first_pressure(QUALITIES["standard"], 0.0, False) == 0.3
 
 
 @pytest.mark.parametrize("quality", QUALITIES)

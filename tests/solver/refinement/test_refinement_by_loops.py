@@ -145,7 +145,7 @@ def test_contact_is_the_first_time_at_which_a_point_is_on_a_moving_segment(seed)
     p, dp, e, de = rng.normal(size=(4, 40)) + 1j * rng.normal(size=(4, 40))
     de[::4] = 0
     found = boundary_barrier._contact_times(p, dp, e, de)
-    t = np.linspace(0, 1 / boundary_barrier.CONTACT_SHARE, 40001)
+    t = np.linspace(0, 1 / 0.8, 40001)
     for k in range(40):
         at, edge = p[k] + t * dp[k], e[k] + t * de[k]
         side = crossing(edge, at)
@@ -324,7 +324,7 @@ def test_steps_of_single_vertices_are_halved_until_each_ones_energy_falls():
     moved, after = vertex_sweeps._searched(row, around, step, 5.0, value)
     halved = set()
     for x in range(k):
-        for halving in range(vertex_sweeps.HALVINGS):
+        for halving in range(5):
             trial = w.copy()
             trial[vertex[x]] += step[x] / 2**halving
             new = energies(star, trial, 5.0)[row == x].sum()

@@ -113,7 +113,7 @@ def test_a_cut_lies_on_its_image_where_most_of_it_is_beside_it(beside, most, sha
     V[:5, 0] = 2 * np.arange(5)
     V[5:] = V[:5]
     V[5:, 1] = 99.0
-    V[5 : 5 + beside, 1] = share * parting.BESIDE * 2
+    V[5 : 5 + beside, 1] = share * 2.0 * 2
     monkeypatch.setattr(parting, "_images_in", lambda chart, nearest: np.concatenate([np.arange(5, 10), np.arange(5)]))
     ends = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
     chart, images = SimpleNamespace(vertices=V), SimpleNamespace(nearest=None)
@@ -172,7 +172,7 @@ def test_seams_are_searched_where_a_component_is_curved_and_wanted(wants, monkey
     own = SimpleNamespace(
         search=Search(), gluing=SimpleNamespace(owner=np.array([5, 6, 7, 8])), positions=None, surface=None
     )
-    curvature = np.array([0.0, 1.001, 0.999]) * cuts.CURVED
+    curvature = np.array([0.0, 1.001, 0.999]) * 0.2
     curvature[0] = 99.0
     monkeypatch.setattr(cuts, "total_curvature", lambda *_: curvature)
     monkeypatch.setattr(cuts, "marked_triangles", lambda *_: np.array([False, True, False, False]))
@@ -193,12 +193,12 @@ def test_what_is_held_already_answers_with_nothing_but_rounding(scale):
     free = held.between(np.array([2]))
     assert free[0, 0] == pytest.approx(green[2, 2])
     again = held.at(np.array([2, 4])).between(np.array([2, 4]))
-    least = predicted_scale.LEAST_ROUNDING * np.diag(green)[[2, 4]]
+    least = 1e-13 * np.diag(green)[[2, 4]]
     assert (np.diag(again) >= least).all() and (np.diag(again) < 1e-6 * np.diag(green)[[2, 4]]).all()
     one = held.at(np.array([2])).between(np.array([2]))
     assert one[0, 0] >= least[0] and one[0, 0] < 1e-6 * green[2, 2]
     # Several together are loosened a little, each by itself and by the greatest.
     both = held.between(np.array([1, 3]))
     own = np.diag(green)[[1, 3]]
-    more = predicted_scale.ROUNDING * own + predicted_scale.LEAST_ROUNDING * own.max()
+    more = 1e-8 * own + 1e-13 * own.max()
     np.testing.assert_allclose(both - green[np.ix_([1, 3], [1, 3])], np.diag(more), atol=1e-9 * own.max())

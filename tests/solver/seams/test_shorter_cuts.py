@@ -48,10 +48,10 @@ def shortened(monkeypatch, sheared, asked, shear_of, spread=0.01):
 @pytest.mark.parametrize("sheared", [0.02, 0.05, 0.08])
 def test_each_step_goes_as_far_as_the_shear_says_and_halfway_to_where_it_was_too_short(monkeypatch, power, sheared):
     asked, spread = 0.09, 0.01
-    most = spread * rehearsal.MOST_CHANGE
+    most = spread * 4.0
     kept, value, bounds = shortened(monkeypatch, sheared, asked, lambda s: sheared * (s / spread) ** power)
     assert value <= asked and value == pytest.approx(sheared * (kept / spread) ** power)
-    assert kept >= spread and len(bounds) <= rehearsal.SHORTER
+    assert kept >= spread and len(bounds) <= 4
     now, shear, above = spread, sheared, most
     for bound in bounds:
         expected = min(np.sqrt(now * above), now * (asked / shear) ** rehearsal.SPREAD_BY_SHEAR)
@@ -71,8 +71,8 @@ def test_a_cut_that_is_near_enough_or_has_no_map_stays(monkeypatch, sheared):
 
 def test_what_is_flat_goes_halfway_and_what_has_no_map_is_too_short(monkeypatch):
     kept, value, bounds = shortened(monkeypatch, 0.0, 0.09, lambda s: None)
-    assert kept == 0.01 and value == 0.0 and len(bounds) == rehearsal.SHORTER
-    above = 0.01 * rehearsal.MOST_CHANGE
+    assert kept == 0.01 and value == 0.0 and len(bounds) == 4
+    above = 0.01 * 4.0
     for bound in bounds:
         assert bound == pytest.approx(np.sqrt(0.01 * above))
         above = bound

@@ -113,7 +113,7 @@ def kept(mine, monkeypatch):
 
 
 def bound(shears, asked=0.5):
-    return round((asked * rehearsal.NEAR_ENOUGH / shears) ** rehearsal.SPREAD_BY_SHEAR, 9)
+    return round((asked * 0.88 / shears) ** rehearsal.SPREAD_BY_SHEAR, 9)
 
 
 def test_what_keeps_the_bound_is_only_made_shorter(kept):
@@ -131,7 +131,7 @@ def test_what_does_not_is_made_longer_by_the_best_that_is_not_too_dear(kept):
     assert kept(first, [second], [found(1.9, 0.8)], [third])[0][0].cut.cost == 1.9
     # One that shears as much, or costs much more, is none.
     assert kept(first, [found(0.5, 2.0)])[0][0] is first
-    worth = rehearsal.WORTH * price(1.0, 2.0, 0.5)
+    worth = 1.2 * price(1.0, 2.0, 0.5)
     for share, taken in ((0.999, True), (1.001, False)):
         other = found(share * worth / 0.5**0.9 - 2, 0.5)
         assert (kept(first, [other])[0][0] is other) == taken
@@ -148,7 +148,7 @@ def test_cuts_are_made_longer_in_three_ways(monkeypatch):
     monkeypatch.setattr(rehearsal, "rerouted", lambda task, cut: f"rerouted {cut}")
     monkeypatch.setattr(rehearsal, "trimmed", lambda task, cut: f"trimmed {cut} to {task.bound:g}")
     found = rehearsal._longer(Task(2.0), "cut")
-    assert found == ["cut 2", "second 2", "third 2", f"trimmed rerouted cut {2 * rehearsal.FURTHER:g} to 2"]
+    assert found == ["cut 2", "second 2", "third 2", f"trimmed rerouted cut {2 * 0.6:g} to 2"]
 
 
 def test_a_cut_is_made_shorter_until_that_is_enough(mine, monkeypatch):
@@ -171,15 +171,15 @@ def test_a_cut_is_made_shorter_until_that_is_enough(mine, monkeypatch):
     assert run(first, 0.94) == (first, 0.94) and run(first, None) == (first, None) and not bounds
     better = found(5.0, 0.95, spread=6.0)
     assert run(first, 0.5, better) == (replace(first, cut=better.cut), 0.95)
-    assert bounds == [pytest.approx(min(4 * 2.0**rehearsal.SPREAD_BY_SHEAR, 4 * rehearsal.MOST_CHANGE**0.5))]
+    assert bounds == [pytest.approx(min(4 * 2.0**rehearsal.SPREAD_BY_SHEAR, 4 * 4.0**0.5))]
     # Where that was too short it goes halfway back; flat ones have no spread to go by.
     result = run(first, 0.0, found(1.0, 1.01), found(2.0, None), found(3.0, 1.0))
     assert result[0].cut.cost == 3.0
-    most = 4 * rehearsal.MOST_CHANGE
+    most = 4 * 4.0
     want = [np.sqrt(4 * most)]
     want += [np.sqrt(4 * want[0])]
     assert bounds == pytest.approx([*want, np.sqrt(4 * want[1])])
-    assert len(run(first, 0.1, *[found(1.0, 5.0)] * 9)) == 2 and len(bounds) == rehearsal.SHORTER
+    assert len(run(first, 0.1, *[found(1.0, 5.0)] * 9)) == 2 and len(bounds) == 4
 
 
 # ---- maps of coarse surfaces --------------------------------------------------------------------------------

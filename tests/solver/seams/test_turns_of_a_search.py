@@ -105,7 +105,7 @@ def test_an_exact_mirror_that_is_whole_needs_no_other(best):
 
 @pytest.mark.parametrize(("share", "name"), [(0.999, "exact"), (1.001, "near")])
 def test_a_parted_exact_cut_is_taken_where_it_is_not_much_dearer_than_one_along_a_line(share, name, best):
-    exact = Cut("exact", share * searches.EXACTLY, whole=False)
+    exact = Cut("exact", share * 1.1, whole=False)
     found, tried = best(exact=exact, near=Cut("near", 1.0), first=Cut("first", 10.0), mirror=EXACT)
     assert found == name and (tried == ["exact", "near"]) == (name == "exact")
     stuck = Cut("exact", 0.1, True, whole=False)
@@ -114,7 +114,7 @@ def test_a_parted_exact_cut_is_taken_where_it_is_not_much_dearer_than_one_along_
 
 def test_symmetric_cuts_may_cost_as_much_more_as_they_are_worth(best):
     # Others get shorter by a share when they are made shorter.
-    most = (1 - searches.SHORTENED) * 1.2
+    most = (1 - 0.1) * 1.2
     assert best(near=Cut("near", 0.999 * most), first=Cut("first", 1.0), mirror=NEAR) == (
         "near",
         ["near", "model", "first"],
@@ -156,7 +156,7 @@ def test_symmetric_cuts_are_the_best_of_several_made_shorter(count, monkeypatch)
     monkeypatch.setattr(SeamSearch, "_shortened", lambda self, found: worked(Cut("short " + found.name, 1.0)))
     found, fractions = told(SeamSearch(np.zeros(1), None, None)._symmetric(None, None, 0.5, None))
     assert found is None if not count else found.name == f"short {count - 1}"
-    grown = searches.GROWN
+    grown = 0.5
     assert fractions == pytest.approx([0, grown] + ([grown, grown + 0.2, grown + 0.2, 1.0] if count else []))
 
 
@@ -191,9 +191,7 @@ def test_cuts_are_grown_on_surfaces_until_one_cannot_get_along_the_plane(by_surf
     count = 3 if mirror is None or broken is None else broken
     assert found == [(10 + k if by_surface else 0.5, 7) for k in range(count)]
     assert made[0] == (0, 2.0) and len(made) == (3 if count == 3 else count + 1)
-    assert set(asked) <= {searches.PARTLY if mirror is EXACT else searches.REACHED} and bool(asked) == (
-        mirror is not None
-    )
+    assert set(asked) <= {0.5 if mirror is EXACT else searches.REACHED} and bool(asked) == (mirror is not None)
     assert fractions == pytest.approx([x for k in range(count) for x in (k / 3, (k + 1) / 3)])
 
 
@@ -268,17 +266,17 @@ def again(monkeypatch):
 
 
 def test_where_little_is_missing_arcs_are_added(again):
-    assert again(searches.CLOSE) == (Carried("added"), ["added"])
+    assert again(0.85) == (Carried("added"), ["added"])
     assert again(0.1, adding=True) == (Carried("added"), ["added"])
     # Where that does not do, finer surfaces have to.
-    found, tried = again(searches.CLOSE, added=Grown("added", 1.1))
+    found, tried = again(0.85, added=Grown("added", 1.1))
     assert found == Carried("short finer") and tried == ["added", "finer"]
 
 
 def test_what_a_map_has_told_holds_for_what_is_added(again):
     found, tried = again(0.1, adding=True, told=0.4, rehearse=True, added=Grown("added", 9.0))
     assert found == Carried("added", rehearsed=0.25) and tried == ["added", "rehearsed 0.040"]
-    near = searches.NEARLY_THERE
+    near = 0.6
     assert again(near, told=0.4, rehearse=True)[1] == ["added", f"rehearsed {0.4 * near:.3f}"]
     # What was told counts only while rehearsals do.
     assert again(near, told=0.4)[1] == ["finer"]
@@ -286,7 +284,7 @@ def test_what_a_map_has_told_holds_for_what_is_added(again):
 
 
 def test_where_more_is_missing_it_is_grown_on_or_on_finer_surfaces(again):
-    near = searches.NEARLY_THERE ** (1 / searches.SPREAD_BY_SHEAR)
+    near = 0.6 ** (1 / searches.SPREAD_BY_SHEAR)
     assert again(1.001 * near) == (Carried("short further"), ["further"])
     assert again(1.001 * near, further=Grown("further", 1.01))[1] == ["further", "finer"]
     assert again(0.999 * near)[1] == ["finer"]
