@@ -71,9 +71,9 @@ def test_a_fit_ends_where_no_moves_are_left(works, rounds, delaunay, monkeypatch
     monkeypatch.setattr(fit, "lower_peaks", lambda state: done("lowered", 0.5, 1.0))
     mesh = SimpleNamespace(points=np.zeros((4, 3)), delaunay=delaunay)
     found, fractions = told(fit.fit_to_surface(mesh, None, None))
-    rounds = fit.ROUNDS if rounds is None else rounds
+    rounds = 5 if rounds is None else rounds
     assert found == ("lowered" if delaunay else mesh)
-    own = [0.6 * (k + 1) / fit.ROUNDS for k in range(rounds)]
+    own = [0.6 * (k + 1) / 5 for k in range(rounds)]
     assert fractions == pytest.approx([*own, 0.8, 1.0] if delaunay else own)
 
 
@@ -177,7 +177,7 @@ def test_what_has_no_symmetric_cut_is_cut_without_symmetry(mirror, monkeypatch):
     component = SimpleNamespace(positions=np.zeros((3, 3)), ends=np.array([[0, 1]]))
     found = Found(mirror, np.array([0]), SimpleNamespace(positions=np.zeros((20, 3))))
     cut, _ = told(search.SeamSearch._grown_finer(own, component, found, 0.5))
-    finer = min(search.FINER * 2.0, search.FINEST)
+    finer = min(1.5 * 2.0, 2.5)
     assert cut.score == 1.0 and asked == [(mirror, 3, finer)] * (mirror is not None) + [(None, 3, finer)]
 
 
@@ -229,7 +229,7 @@ def test_affine_maps_of_more_rings_are_tried_while_pairs_are_left(left, far, use
 @pytest.mark.parametrize("many", [False, True])
 def test_charts_that_cannot_be_triangulated_are_so_by_even_maps_or_refused(rounds, works, many, monkeypatch):
     asked = []
-    count = initial_mesh.FEW + many
+    count = 50 + many
 
     def triangulate(places, disk, loop, maps, boundary, inner):
         asked.append(maps)

@@ -208,7 +208,7 @@ def test_what_lets_edges_cross_is_taken_back(last, monkeypatch):
     # The edges 0-1 and 2-3, and then 2-3 and 3-4; all of the loop if that did not help.
     assert w.tolist() == [0, 1, 2, 3, 4]
     assert [a[0].real.tolist() for a in asked[:3]] == [[1] * 5, [0, 0, 0, 0, 1], [0] * 5]
-    assert asked[0][1] == (1.0, vertex_sweeps.ROOM) and len(asked) == 3
+    assert asked[0][1] == (1.0, 6.0) and len(asked) == 3
 
 
 @pytest.mark.parametrize(("kind", "boundary"), [("conformal", "square"), ("conformal", "free"), ("polar", "square")])

@@ -57,8 +57,8 @@ def test_equations_that_stay_singular_are_shifted_until_the_shift_is_that_of_the
         projected_newton._solution(sp.identity(2).tocsc(), np.ones(2), 2.0, Parts(), None, None, None)
     # Each shift is that much larger than the one before, and added to it.
     shifts = np.diff(tried) / 2
-    growth = projected_newton.SHIFT_GROWTH
-    first = projected_newton.SHIFT * growth
+    growth = 1e3
+    first = 1e-10 * growth
     assert shifts == pytest.approx(first * growth ** np.arange(len(shifts)), rel=1e-3)
     assert shifts[-1] > 1 >= shifts[-2]
 
@@ -111,7 +111,7 @@ def test_inverses_are_those_of_matrices_that_are_positive_or_all_but(beside, fit
             predicted_scale._inverse(matrix, free, 3)
         return
     found = predicted_scale._inverse(matrix, free, 3)
-    own = 1 + predicted_scale.SLIVER_GROUND * (beside == 1)
+    own = 1 + 1e-9 * (beside == 1)
     expected = np.linalg.inv([[own, beside], [beside, own]])
     assert not found[1].any() and not found[:, 1].any()
     np.testing.assert_allclose(found[np.ix_(free, free)], expected, rtol=1e-3 if beside == 1 else 1e-12)
@@ -180,7 +180,7 @@ def test_densities_vary_by_no_more_than_a_bound(beyond, fits, monkeypatch):
 
 @pytest.mark.parametrize(("factor", "fits"), [(1.01, True), (0.99, False)])
 def test_neighbours_in_a_conformal_map_lie_apart(factor, fits):
-    near = factor * disk_map.RESOLUTION
+    near = factor * 1e-12
     uv = np.array([[0.0, 0], [1, 0], [near, 0]])
     if fits:
         assert disk_map._check_resolution(uv, np.array([[0, 1, 2]])) is None
@@ -189,8 +189,8 @@ def test_neighbours_in_a_conformal_map_lie_apart(factor, fits):
             disk_map._check_resolution(uv, np.array([[0, 1, 2]]))
 
 
-@pytest.mark.parametrize(("steps", "fits"), [(0, True), (3, True), (punctured_sphere.MAX_STEPS - 1, True),
-                                             (punctured_sphere.MAX_STEPS, False), (None, False)])  # fmt: skip
+@pytest.mark.parametrize(("steps", "fits"), [(0, True), (3, True), (59, True),
+                                             (60, False), (None, False)])  # fmt: skip
 def test_flat_polygons_are_found_in_so_many_steps_or_not(steps, fits, monkeypatch):
     class Metric:
         def __init__(self, tri, puncture, k=0):
@@ -222,7 +222,7 @@ def test_a_step_that_leads_nowhere_is_halved_and_refused():
             self.gradient = np.ones(3)
 
         def _newton_direction(self):
-            direction = np.array([punctured_sphere.MAX_LOG_SCALE, 0.0, 0.0])
+            direction = np.array([40.0, 0.0, 0.0])
             tried.append(direction)
             return 2.0**15 * direction
 
@@ -279,14 +279,14 @@ def test_windows_grow_where_cells_come_to_their_ends(rounds, monkeypatch):
     monkeypatch.setattr(partition_cells, "geodesic_cells", lambda pairs, weights, mass: cells_of(len(asked)))
     problem = SimpleNamespace(mesh=None, mass=None, part=None, asked=None)
     dual = partition_cells.GeodesicDual(problem, None, Pairs(), np.array([1.0, 2, 3, 4]))
-    if rounds > partition_cells.MOST_GROWTHS:
+    if rounds > 60:
         with pytest.raises(errors.TransportError):
             dual._within_windows(None, cells_of(0))
         return
     dual._within_windows(None, cells_of(0))
     assert dual.diagrams == len(asked) == rounds
     for k, (radius, short) in enumerate(asked, 1):
-        growth = partition_cells.GROWTH**k
+        growth = 1.5**k
         assert short == [0, 2] and radius == [1 * growth, 3 * growth]
 
 
@@ -306,7 +306,7 @@ def test_a_count_that_is_not_reached_is_refused_with_the_mesh_as_it_is(folds, mo
     with pytest.raises(vertex_count.StuckError):
         vertex_count.reach_vertex_count(mesh, 3, lambda points: np.ones(len(points)), folds)
     each = [(1, vertex_count.MIN_COSINE)] + [(1, vertex_count.ANY_COSINE)] * folds
-    assert calls == each * (vertex_count.MAX_ROUNDS if folds else 1)
+    assert calls == each * (500 if folds else 1)
     assert vertex_count.reach_vertex_count(mesh, 4, None) is mesh
 
 

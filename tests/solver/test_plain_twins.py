@@ -137,7 +137,7 @@ def test_outlines_are_circles_sides_or_neither(count, shape):
     w = np.append(around + (3 - 2j), 3 - 2j)
     found = outline.recognise_outline(w, np.arange(count))
     if shape == "circle":
-        assert (found.kind == "circle") == (count >= outline.FEWEST)
+        assert (found.kind == "circle") == (count >= 12)
     elif shape == "polygon":
         assert found.kind == "sides"
     # Whatever it is taken for, it is where it was.

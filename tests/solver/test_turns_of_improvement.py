@@ -118,7 +118,7 @@ def test_stretches_are_replaced_by_cheaper_ones_that_keep_the_surface_whole(
 @pytest.mark.parametrize(("share", "taken"), [(1.1, True), (0.9, False)])
 def test_what_is_better_is_so_by_a_thousandth(share, taken, written, monkeypatch):
     written(stretches=[[0, 1]])
-    less = 1000 * (1 - share * improvement.BETTER)
+    less = 1000 * (1 - share * 1e-3)
     given = task(cost=[500, 500, 0, 0, 0, 0, 0, 0, less, 0])
     given.graph.steps_of = np.array
     monkeypatch.setattr(improvement, "_bridge", lambda *_: [8])
@@ -140,7 +140,7 @@ def test_the_leaf_that_is_worth_least_is_taken_back_first_then_some_at_random(in
     if in_vain < 3:
         assert found.steps.tolist() == [k for k in range(6) if k not in order[in_vain]]
     else:
-        chosen = np.random.default_rng(0).random(3) < improvement.RANDOM_SHARE
+        chosen = np.random.default_rng(0).random(3) < 0.4
         gone = {s for leaf, c in zip(leaves, chosen, strict=True) if c for s in leaf.tolist()} or {3, 4}
         assert found.steps.tolist() == [k for k in range(6) if k not in gone]
 
@@ -161,7 +161,7 @@ def test_trials_are_kept_where_they_are_better_within_the_bound(outcomes, writte
     monkeypatch.setattr(improvement, "rerouted", lambda task, cut: cut)
 
     def trimmed(task, most):
-        assert most == improvement.MOST_REGROWN
+        assert most == 12
         spread, cost, _ = rest.pop(0)
         return Cut(np.arange(3), spread, cost)
 

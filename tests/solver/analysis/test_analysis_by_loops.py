@@ -217,7 +217,7 @@ def test_small_regions_join_the_neighbour_with_most_border():
     length = np.array([0.5, 0.8, 6.0, 10.0])
     group = feature_edges._merged(area, boundary, own, other, length)
     assert group[2] == group[1] != group[0] == group[3]
-    least = feature_edges.LEAST_TRIANGLES * np.sqrt(3) / 4
+    least = 0.7 * np.sqrt(3) / 4
     for size, joins in ((least * 0.99, True), (least * 1.01, False)):
         group = feature_edges._merged(
             np.array([50.0, size]), np.array([5.0, 0]), np.array([0]), np.array([1]), np.array([0.1])

@@ -192,7 +192,7 @@ def test_reasons_of_vertices_are_steps_between_their_bounds(monkeypatch):
     fixed = {
         "hidden_sides": lambda *_: None,
         "outside_out": lambda _, triangles, __: triangles,
-        "curvature_means": lambda *_: {seam_costs.CREASE_SCALE: curvature},
+        "curvature_means": lambda *_: {4.0: curvature},
         "saliency_of": lambda *_: None,
         "facing": lambda *_: seen,
         "vertex_occlusion": lambda *_: occlusion,

@@ -98,7 +98,7 @@ def test_what_is_near_is_around_or_within_reach_of_one_of_about_its_size(seeds, 
     near[F[[k for k, f in enumerate(F) if chosen[f].any()]]] = True
     for at in (V, after):
         for v in seeds:
-            reach = creases.REACH * np.mean([size[w] for w in seeds if octave[w] == octave[v]])
+            reach = 5 * np.mean([size[w] for w in seeds if octave[w] == octave[v]])
             near |= np.linalg.norm(at - at[v], axis=1) < reach
     assert np.array_equal(creases._near((V, after), F, chosen), near)
     assert chosen.sum() < near.sum() < len(V)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from omt_uv.solver.flows import creases, flow_map, kernel
+from omt_uv.solver.flows import creases, flow_map
 from omt_uv.solver.flows import shape as shapes
 from omt_uv.solver.flows.kernel import FlowField
 
@@ -28,7 +28,7 @@ def test_what_a_sharper_kernel_adds_is_a_share_of_the_coefficients():
     field = FlowField(rng.normal(size=(4, 3)), rng.normal(size=(4, 3)), 1.7, near=0.3)
     narrow = field._narrow
     np.testing.assert_allclose(narrow.coefficients, 0.3 * field.coefficients)
-    assert narrow.sharpness == pytest.approx(kernel.SHARPER * 1.7)
+    assert narrow.sharpness == pytest.approx(25.0 * 1.7)
 
 
 def handle(vertices, stays, end):

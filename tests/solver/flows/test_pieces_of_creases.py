@@ -89,9 +89,9 @@ def test_what_meets_is_smoothed_until_nothing_does_and_the_best_is_kept(counts, 
     monkeypatch.setattr(smoothing, "touched", lambda after, position, triangles: np.zeros(len(triangles), bool))
     after = V + 0.1 * np.random.default_rng(0).normal(size=V.shape)
     found, left = smoothing.smoothed_apart(V, after, SimpleNamespace(triangles=F), free)
-    rounds = smoothing.ROUNDS if rounds is None else rounds
+    rounds = 60 if rounds is None else rounds
     assert len(asked) == rounds and len(left) == min(counts[: rounds + 1])
-    assert [a[1] for a in asked] == [smoothing.RINGS + k // smoothing.WIDER_EVERY for k in range(rounds)]
+    assert [a[1] for a in asked] == [1 + k // 8 for k in range(rounds)]
     for (met, _), count in zip(asked, [*counts, *[counts[-1]] * 99], strict=False):
         assert met == sorted({*range(count), *range(5, 5 + count)})
     position = after.copy()

@@ -97,7 +97,7 @@ def test_gradients_end_where_the_window_says_or_tell_that_they_did_not():
 
     fall = falls()
     for enough in (0.3, 0.03, 1e-3):
-        window = kept_factor.WINDOW
+        window = 3
         end = next(k for k in range(window, 60) if fall[k] - fall[k - window] <= enough * fall[k])
         x = kept_factor.by_gradients(A, b, lambda r: r, end, enough)
         assert 2 * (b @ x) - x @ A @ x == pytest.approx(fall[end], rel=1e-9)

@@ -69,15 +69,15 @@ def test_the_direction_of_an_island_is_that_of_most_of_its_sides(turn):
             a, b = sorted(edge)
             d = other[b] - other[a]
             angle = np.arctan2(d[1], d[0]) % quarter
-            bins.append(min(int(angle / quarter * upright.BINS), upright.BINS - 1))
+            bins.append(min(int(angle / quarter * 180), 180 - 1))
             lengths.append(np.hypot(*d))
             angles.append(angle)
         bins, lengths, angles = np.array(bins), np.array(lengths), np.array(angles)
 
         def near(k):
-            return np.abs((bins - k + upright.BINS // 2) % upright.BINS - upright.BINS // 2) <= 3
+            return np.abs((bins - k + 180 // 2) % 180 - 180 // 2) <= 3
 
-        within = [lengths[near(k)].sum() + 1e-6 * lengths[bins == k].sum() for k in range(upright.BINS)]
+        within = [lengths[near(k)].sum() + 1e-6 * lengths[bins == k].sum() for k in range(180)]
         k = int(np.argmax(within))
         z = (lengths * near(k) * np.exp(4j * angles)).sum()
         return lengths[near(k)].sum() / lengths.sum(), np.angle(z) / 4

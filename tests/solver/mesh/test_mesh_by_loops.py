@@ -216,7 +216,7 @@ def test_candidates_are_those_within_reach_and_the_nearest_stands_for_the_others
     owner, samples = index._spread
     points = np.array([[0.52, 0.47, 0.05], [0.5, 0.5, 9.0]])
     near, faces = index._candidates(owner, index._plain, points, 0.3)
-    assert near.tolist() == [True, False] and faces.shape == (1, min(closest_point.MORE_CANDIDATES, len(owner)))
+    assert near.tolist() == [True, False] and faces.shape == (1, min(8, len(owner)))
     away = np.linalg.norm(samples - points[0], axis=1)
     assert set(faces[0].tolist()) <= set(owner[away <= 0.3].tolist()) and faces[0, 0] == owner[away.argmin()]
     nearest = np.linalg.norm(samples - points[0], axis=1).argmin()

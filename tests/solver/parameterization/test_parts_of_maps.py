@@ -534,8 +534,8 @@ def test_what_comes_back_is_smoothed_at_the_scale_of_its_target():
     uv = flat_uv(disk) * 7
     given = disk.vertices, disk.triangles, disk.target, uv, 200.0
     drafts = [
-        drain(smoothed_uv(*given, initial_map.DRAFT_SWEEPS, 0.05)),
-        drain(smoothed_uv(*given, initial_map.SWEEPS)),
+        drain(smoothed_uv(*given, 16, 0.05)),
+        drain(smoothed_uv(*given, 8)),
     ]
     for found in drafts:
         area = signed_areas(found, disk.triangles)

@@ -12,7 +12,7 @@ from omt_uv.solver.parameterization import convexity
 def rings(reflex, triangles, n):
     """The same, vertex by vertex."""
     free = set(reflex.ravel().tolist())
-    for _ in range(convexity.RINGS):
+    for _ in range(4):
         more = set(free)
         for t in triangles.tolist():
             if free & set(t):

@@ -271,7 +271,7 @@ def test_what_stays_steep_after_slits_comes_apart_where_it_lies_in_its_own_way(r
         return chart.vertices[:, :2]
 
     steep = local_shear(chart, chart_map, True)[0] > shear_search.STEEP
-    assert area[steep].sum() > shear_search.MOST_STEEP * area.sum()
+    assert area[steep].sum() > 0.01 * area.sum()
     found, flat_sides, crossed = drain(shear_bound._apart(search, last, crossing, rounds, set()))
     parts = strict_charts(triangle_surface(V, F, found.get(0, np.zeros((0, 2), int))))
     assert not flat_sides and crossed == comes_apart and len(parts) == (2 if comes_apart else 1)

@@ -182,4 +182,4 @@ def test_small_parts_are_those_of_a_small_share(count):
     density = np.array([1.0, 2.0, 1.0])
     found = remeshes._small(components, density, count)
     share = np.array([1, 4, 7]) / 12
-    assert found.tolist() == (count * share < remeshes.BATCH_BELOW).tolist()
+    assert found.tolist() == (count * share < 500).tolist()

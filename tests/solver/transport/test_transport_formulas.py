@@ -31,7 +31,7 @@ def test_the_first_step_in_the_plane_is_the_greatest_half_of_a_half_within_reach
     found = semidiscrete.PlanarDual.first_step(dual, SimpleNamespace(edges=edges), direction)
     reach = min(np.sum((sites[i] - sites[j]) ** 2) / abs(direction[i] - direction[j]) for i, j in edges)
     halves = [0.5**k for k in range(MAX_HALVINGS + 1)]
-    assert found == next((h for h in halves if h <= semidiscrete.BOLD * reach), halves[-1])
+    assert found == next((h for h in halves if h <= 256.0 * reach), halves[-1])
 
 
 @pytest.mark.parametrize("size", [1e-9, 0.3, 7.0, 1e5])

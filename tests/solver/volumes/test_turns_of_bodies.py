@@ -138,7 +138,7 @@ def test_one_body_goes_into_another_through_the_ball(placed, fails, monkeypatch)
 def test_what_is_inverted_or_off_is_told(count, shares, begins):
     found = body_map._told(count, shares)
     assert len(found) == len(begins) and all(a.startswith(b) for a, b in zip(found, begins, strict=True))
-    assert len(body_map._told(0, 0.999 * body_map.COARSE)) == 0 and len(body_map._told(0, 1.001 * body_map.COARSE)) == 1
+    assert len(body_map._told(0, 0.999 * 0.02)) == 0 and len(body_map._told(0, 1.001 * 0.02)) == 1
 
 
 def test_meshes_are_put_into_the_box_of_their_surface():
