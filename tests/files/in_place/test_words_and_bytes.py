@@ -563,3 +563,14 @@ def test_uvs_of_vertices_are_as_wide_as_the_file_says(order):
     split = ply.Split(np.arange(3), np.zeros(0, int), np.ones(3, bool), wished)
     rows = ply._binary_vertices(mesh, split, old)
     assert rows == data(wished)[len(header) : len(header) + len(rows)] and len(rows) == 3 * 26
+
+
+@pytest.mark.parametrize("offset", [None, 0, 6])
+def test_views_begin_where_they_say_and_at_the_start_where_they_do_not(offset):
+    view = {"buffer": 2, "byteLength": 3, "byteStride": 12} | ({} if offset is None else {"byteOffset": offset})
+    begin = offset or 0
+    assert gltf._moved(view, 40) == view | {"buffer": 0, "byteOffset": 40 + begin}
+    data = bytes(range(20))
+    doc = {"bufferViews": [view, {"byteLength": 2}], "accessors": [{"bufferView": 1}, {"bufferView": 0}]}
+    held = gltf._contents(SimpleNamespace(doc=doc, binary=data))
+    assert held == [(data[:2], None), (data[begin : begin + 3], 12)]
