@@ -161,7 +161,7 @@ def test_paths_are_led_on_the_first_graph_that_has_one_and_then_from_farther_awa
 
 
 @pytest.mark.parametrize("wants", [True, False])
-def test_seams_are_searched_where_a_component_is_curved_and_wanted(wants, monkeypatch):
+def test_seams_are_searched_where_a_component_is_curved_and_asked_for(wants, monkeypatch):
     asked = []
 
     class Search:
