@@ -23,12 +23,12 @@ from omt_uv.solver.contact.self_intersections import intersecting_pairs
 from omt_uv.solver.flows.enclosed_volume import component_volumes, corner_volumes
 from omt_uv.solver.maps.development import developed
 from omt_uv.solver.maps.distortion import face_distortion
-from omt_uv.solver.maps.energy import elements, energies, energy, gradient, hat_gradients
+from omt_uv.solver.maps.energy import elements, energies, energy, gradient
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary, map_energy
 from omt_uv.solver.mesh.closest_point import spread_points
 from omt_uv.solver.mesh.edge_flips import longer_diagonals, shorter_diagonals
-from omt_uv.solver.mesh.geometry import cotangent_laplacian, face_areas, least_angles
+from omt_uv.solver.mesh.geometry import cotangent_laplacian, face_areas, hat_gradients, least_angles
 from omt_uv.solver.mesh.polygon_areas import polygon_areas
 from omt_uv.solver.mesh.topology import boundary_loops, vertices_around
 from omt_uv.solver.refinement.initial_maps import inner_curvature, least_squares_conformal

@@ -21,13 +21,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import cross3, lengths
+from ..mesh.geometry import gradients_of, kept_hats
 
 # A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
 SHARE_ERROR = 2.7
 # and so much that of single faces of the region, or of the rest: they may be off by 1.8 %.
 FACE_ERROR = 0.45
-# Triangles whose gradients are found at a time: what is found on the way takes ten times their memory.
+# Triangles whose derivatives are found at a time: what is found on the way takes ten times their memory.
 AT_ONCE = 100_000
 
 
@@ -35,33 +35,61 @@ AT_ONCE = 100_000
 class Quads:
     """Quads of a surface: size (q,4), the areas of their four triangles over that of the quad, those of the given
     diagonal first; convex (q,) bool, whether all four are on the quad's own side; crossed (q,) bool, if there are any,
-    whether one stands for images that are cut along the other diagonal, too, so that it needs both in every map."""
+    whether one stands for images that are cut along the other diagonal, too, so that it needs both in every map; both
+    (q,) bool, or None for no quad, whose shear is the mean over both triangulations."""
 
     size: np.ndarray
     convex: np.ndarray
     crossed: np.ndarray | None = None
+    both: np.ndarray | None = None
+
+    @property
+    def part(self) -> np.ndarray:
+        """How much (q,4) of the area of the quad each triangle stands for."""
+        return self.size * ([1, 1, 0, 0] if self.both is None else np.where(self.both[:, None], 0.5, [1, 1, 0, 0]))
+
+    def of(self, some) -> Quads:
+        """Some of the quads, a slice or (q,) bool."""
+        return Quads(*(None if x is None else x[some] for x in (self.size, self.convex, self.crossed, self.both)))
 
 
 @dataclass(frozen=True)
 class Elements:
     """Polygons of a surface, and the triangles on which their shear is measured, ready for the energy.
 
-    triangles (m,3); gradient (m,3) complex, the gradients of the hat functions in each triangle's own plane. Of every
-    polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface area; weight (p,) in the
+    triangles (m,3); hats (m,3), the gradients of the hat functions in each triangle's own plane, complex, or, of many,
+    what `gradients_of` makes them of. Of every polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface area; weight (p,) in the
     energy, summing to 1; region (p,) in [0, 1], weights of a region whose share shall be exact, if there is one.
-    polygon (m,): whose triangle each is, None where each is a polygon of its own; part (m,): how much of its polygon's
-    area it stands for, 0 for one that does not count; quads: those of the last triangles, four each.
+    polygon (m,): whose triangle each is, None where each is a polygon of its own; lone (k,): how much of its polygon's
+    area each stands for that is none of a quad's; quads: those of the last triangles, four each.
     """
 
     triangles: np.ndarray
     area: np.ndarray
-    gradient: np.ndarray
+    hats: np.ndarray
     ratio: np.ndarray
     weight: np.ndarray
     region: np.ndarray | None = None
     polygon: np.ndarray | None = None
-    part: np.ndarray | None = None
+    lone: np.ndarray | None = None
     quads: Quads | None = None
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """The gradients (m,3) complex of the hat functions."""
+        return self.gradient_at(slice(None))
+
+    def gradient_at(self, here) -> np.ndarray:
+        """`gradient` of some triangles (k,), a slice or their numbers."""
+        some = self.hats[here]
+        return some if np.iscomplexobj(some) else gradients_of(some)
+
+    @property
+    def part(self) -> np.ndarray | None:
+        """How much (m,) of its polygon's area each triangle stands for, 0 for one that does not count; or None."""
+        if self.lone is None or self.quads is None:
+            return self.lone
+        return np.concatenate([self.lone, self.quads.part.ravel()])
 
     @property
     def owner(self) -> np.ndarray:
@@ -77,7 +105,7 @@ class Elements:
 
     def derivatives_at(self, w: np.ndarray, here: slice) -> tuple[np.ndarray, np.ndarray]:
         """`derivatives` of some triangles (k,)."""
-        corner, g = 0.5 * w[self.triangles[here]], self.gradient[here]
+        corner, g = 0.5 * w[self.triangles[here]], self.gradient_at(here)
         return np.einsum("mi,mi->m", corner, g.conj()), np.einsum("mi,mi->m", corner, g)
 
     def some_at_once(self) -> Iterator[slice]:
@@ -98,9 +126,17 @@ class Elements:
 
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Values of triangles (m,) summed by their parts of the polygons, (p,)."""
-        if self.polygon is None or self.part is None:
+        if self.polygon is None or self.lone is None:
             return values
-        return np.bincount(self.polygon, self.part * values, len(self.area))
+        first, quads = len(self.lone), self.quads
+        # Of no values at all it counts in integers.
+        found = np.bincount(self.polygon[:first], self.lone * values[:first], len(self.area)).astype(float, copy=False)
+        if quads is not None and len(quads.convex):
+            four = quads.part
+            four *= values[first:].reshape(-1, 4)
+            # In this order, as they come: it is that of bincount.
+            found[-len(four) :] = four[:, 0] + four[:, 1] + four[:, 2] + four[:, 3]
+        return found
 
     def of_triangles(self, values):
         """Values of polygons (p,), or one for all, as those of the triangles, (m,)."""
@@ -108,13 +144,14 @@ class Elements:
 
     def folded(self, det: np.ndarray) -> np.ndarray:
         """Triangles (m,) bool that count and whose determinant (m,) is not positive."""
-        folded = ~(det > 0)
-        return folded if self.part is None else folded & (self.part > 0)
+        folded, part = ~(det > 0), self.part
+        return folded if part is None else folded & (part > 0)
 
     @property
     def triangle_areas(self) -> np.ndarray:
         """Area (m,) of the surface that every triangle stands for."""
-        return self.area if self.polygon is None or self.part is None else self.area[self.polygon] * self.part
+        part = self.part
+        return self.area if self.polygon is None or part is None else self.area[self.polygon] * part
 
     @property
     def alone(self) -> np.ndarray | None:
@@ -129,31 +166,9 @@ def elements(
 
     Slivers too thin for double precision keep a finite gradient: their height is at least 1e-9 of their length.
     """
-    area, gradient = hat_gradients(positions, triangles)
+    area, hats = kept_hats(positions, triangles)
     weight = np.maximum(area / area.sum(), target / target.sum())
-    return Elements(triangles, area / area.sum(), gradient, target / area, weight / weight.sum(), region)
-
-
-def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Areas (m,) of triangles (m,3) and the gradients (m,3) complex of their hat functions, in their own planes."""
-    area, gradient = np.empty(len(triangles)), np.empty((len(triangles), 3), complex)
-    for begin in range(0, len(triangles), AT_ONCE):
-        here = slice(begin, begin + AT_ONCE)
-        area[here], gradient[here] = _hat_gradients(positions[triangles[here]])
-    return area, gradient
-
-
-def _hat_gradients(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same of triangles with corners (m,3,3)."""
-    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    side = lengths(e1)
-    x = np.einsum("md,md->m", e2, e1) / side
-    y = lengths(cross3(e1, e2)) / side
-    y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
-    local = np.stack([np.zeros(len(x)), side, x + 1j * y], axis=1)
-    area = 0.5 * side * y
-    # The gradient of a hat function is the opposite side, turned by a quarter, over twice the area.
-    return area, 1j * (local[:, [2, 0, 1]] - local[:, [1, 2, 0]]) / (2 * area)[:, None]
+    return Elements(triangles, area / area.sum(), hats, target / area, weight / weight.sum(), region)
 
 
 def energy(faces: Elements, w: np.ndarray, area_weight: float) -> float:
@@ -272,8 +287,9 @@ def by_squares(faces, a, b, area_weight, pressure, eagerness):
     det = outer - inner
     weight, ratio, whole = faces.weight, faces.ratio, det
     if faces.polygon is not None:
-        det = np.where(faces.part > 0, det, 1)
-        weight, ratio = faces.weight[faces.polygon] * faces.part, faces.ratio[faces.polygon]
+        part = faces.part
+        det = np.where(part > 0, det, 1)
+        weight, ratio = faces.weight[faces.polygon] * part, faces.ratio[faces.polygon]
         whole = faces.sums(det)[faces.polygon]
         area_weight, pressure = faces.of_triangles(area_weight), faces.of_triangles(pressure)
         eagerness = faces.of_triangles(eagerness)
@@ -327,11 +343,10 @@ def area_forms_of(
     """As `area_forms`, from the derivatives a, b (m,) complex of the map."""
     whole = faces.sums(squared(a) - squared(b))
     size = np.sqrt(faces.weight * area_weight * eager_bend(whole / faces.ratio, eagerness)) / faces.ratio
-    g = faces.gradient
-    alone = faces.alone
-    if alone is None or faces.part is None:
+    g, alone, part = faces.gradient, faces.alone, faces.part
+    if alone is None or part is None:
         return np.zeros(faces.triangles.shape, complex)
-    scale = np.where(alone, 0, faces.part * size[faces.polygon])
+    scale = np.where(alone, 0, part * size[faces.polygon])
     return scale[:, None] * (a.conj()[:, None] * g.conj() - b.conj()[:, None] * g)
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import cross3, face_areas, part_by_part
+from ..mesh.geometry import cross3, face_areas, hat_gradients, kept_hats, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
-from .energy import AT_ONCE, Elements, Quads, elements, energies, hat_gradients
+from .energy import AT_ONCE, Elements, Quads, elements, energies
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
 MOST_TRIANGLES = 8
@@ -103,7 +103,7 @@ def polygon_elements(
     mesh = polygon_mesh(triangles, faces)
     # What is kept takes half of the memory that it is computed in.
     every, polygon = mesh.every_triangle().astype(np.int32), mesh.of_polygons().astype(np.int32)
-    area, gradient = hat_gradients(positions, every)
+    area, hats = kept_hats(positions, every)
     q = len(mesh.quads)
     share = np.ones(len(every))
     share[len(every) - 4 * q :] = 0.5
@@ -115,18 +115,17 @@ def polygon_elements(
     asked = mesh.given(target) * whole / given
     weight = np.maximum(whole / whole.sum(), asked / asked.sum())
     inside = None if region is None else mesh.given(region * _areas(positions, triangles)) / given
-    part = area / whole[polygon]
-    size = part[len(every) - 4 * q :].reshape(q, 4).copy()
-    part[len(every) - 4 * q :].reshape(q, 4)[:, 2:] = 0
+    lone = area[: len(every) - 4 * q] / whole[polygon[: len(every) - 4 * q]]
+    size = area[len(every) - 4 * q :].reshape(q, 4) / whole[len(whole) - q :, None]
     return Elements(
         triangles=every,
         area=whole / whole.sum(),
-        gradient=gradient,
+        hats=hats,
         ratio=asked / whole,
         weight=weight / weight.sum(),
         region=inside,
         polygon=polygon,
-        part=part,
+        lone=lone,
         quads=Quads(size, _convex(positions, mesh.quads)),
     )
 
@@ -166,35 +165,32 @@ def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:
 
 def with_convex_quads_of(faces: Elements, area: np.ndarray) -> Elements:
     """As `with_convex_quads`, from the areas (q,4) of the four triangles of every quad in the map, in any unit."""
-    if faces.quads is None or faces.part is None or not len(faces.quads.convex):
+    if faces.quads is None or not len(faces.quads.convex):
         return faces
-    first = len(faces.triangles) - 4 * len(faces.quads.convex)
     whole = area[:, :2].sum(axis=1)
     both = faces.quads.convex & (area > OPEN * faces.quads.size * whole[:, None]).all(axis=1)
     if faces.quads.crossed is not None:
         both |= faces.quads.crossed
-    part = faces.part.copy()
-    part[first:] = (faces.quads.size * np.where(both[:, None], 0.5, [1, 1, 0, 0])).ravel()
-    return faces if np.array_equal(part, faces.part) else replace(faces, part=part)
+    last = np.zeros(len(both), bool) if faces.quads.both is None else faces.quads.both
+    return faces if np.array_equal(both, last) else replace(faces, quads=replace(faces.quads, both=both))
 
 
 def restricted(faces: Elements, kept: np.ndarray, place: np.ndarray) -> Elements:
     """The elements of the polygons `kept` (p,) bool alone, vertex k as vertex place[k]."""
     region = None if faces.region is None else faces.region[kept]
     here = faces.of_triangles(kept)
-    quads = faces.quads
+    quads, lone = faces.quads, faces.lone
     if quads is not None:
-        four = kept[len(kept) - len(quads.convex) :]
-        quads = Quads(quads.size[four], quads.convex[four], None if quads.crossed is None else quads.crossed[four])
+        quads = quads.of(kept[len(kept) - len(quads.convex) :])
     return Elements(
         triangles=place[faces.triangles[here]],
         area=faces.area[kept],
-        gradient=faces.gradient[here],
+        hats=faces.gradient_at(here),
         ratio=faces.ratio[kept],
         weight=faces.weight[kept],
         region=region,
         polygon=None if faces.polygon is None else (np.cumsum(kept) - 1)[faces.polygon[here]],
-        part=None if faces.part is None else faces.part[here],
+        lone=None if lone is None else lone[here[: len(lone)]],
         quads=quads,
     )
 
@@ -236,18 +232,15 @@ def _slice_of(faces: Elements, here: slice, rows: slice) -> Elements:
     """The elements of some triangles that are polygons of their own, or of some quads, that follow each other."""
     lone, quads = here == rows, faces.quads
     if not lone and quads is not None:
-        last = here.start - len(faces.area), (here.stop - len(faces.area)) or None
-        kept = slice(*last)
-        crossed = None if quads.crossed is None else quads.crossed[kept]
-        quads = Quads(quads.size[kept], quads.convex[kept], crossed)
+        quads = quads.of(slice(here.start - len(faces.area), (here.stop - len(faces.area)) or None))
     return Elements(
         triangles=faces.triangles[rows],
         area=faces.area[here],
-        gradient=faces.gradient[rows],
+        hats=faces.gradient_at(rows),
         ratio=faces.ratio[here],
         weight=faces.weight[here],
         polygon=None if lone else np.repeat(np.arange(here.stop - here.start), 4),
-        part=None if lone or faces.part is None else faces.part[rows],
+        lone=None if lone or faces.lone is None else faces.lone[:0],
         quads=None if lone else quads,
     )
 

@@ -11,6 +11,10 @@ from scipy.sparse import csr_matrix
 LEAST_STIFFNESS = 1e-3
 # Rows of arrays that are worked on at a time, so few that what is computed from them stays in the cache.
 CHUNK = 1 << 14
+# Triangles whose gradients are found at a time: what is found on the way takes ten times their memory.
+HATS_AT_ONCE = 100_000
+# Triangles whose gradients are kept: of more, the sides that make them, which take half of the memory.
+KEPT_HATS = 400_000
 
 
 def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -279,3 +283,50 @@ def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarra
     flat = np.full(n, 2 * np.pi)
     flat[boundary] = np.pi
     return flat - around
+
+
+def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (m,) of triangles (m,3) and the gradients (m,3) complex of their hat functions, in their own planes."""
+    area, gradient = np.empty(len(triangles)), np.empty((len(triangles), 3), complex)
+    for begin in range(0, len(triangles), HATS_AT_ONCE):
+        here = slice(begin, begin + HATS_AT_ONCE)
+        area[here], gradient[here] = _hat_gradients(positions[triangles[here]])
+    return area, gradient
+
+
+def kept_hats(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (m,) of triangles (m,3), and their gradients (m,3), or what `gradients_of` makes these of where they are many."""
+    if len(triangles) <= KEPT_HATS:
+        return hat_gradients(positions, triangles)
+    area, sides = np.empty(len(triangles)), np.empty((len(triangles), 3))
+    for begin in range(0, len(triangles), HATS_AT_ONCE):
+        here = slice(begin, begin + HATS_AT_ONCE)
+        area[here], sides[here] = _sides(positions[triangles[here]])
+    return area, sides
+
+
+def _hat_gradients(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Areas and gradients of triangles with corners (m,3,3)."""
+    area, sides = _sides(p)
+    return area, gradients_of(sides)
+
+
+def _sides(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (m,) of triangles with corners (m,3,3), how long their first side is, and where the third corner is seen
+    along it and across, (m,3)."""
+    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    side = lengths(e1)
+    x = np.einsum("md,md->m", e2, e1) / side
+    y = lengths(cross3(e1, e2)) / side
+    y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
+    return 0.5 * side * y, np.stack([side, x, y], axis=1)
+
+
+def gradients_of(sides: np.ndarray) -> np.ndarray:
+    """Gradients (m,3) complex of the hat functions of triangles with these sides (m,3), see `_sides`: the opposite
+    side, turned by a quarter, over twice the area."""
+    side, x, y = sides.T
+    per, found = 1 / (2 * (0.5 * side * y)), np.empty(sides.shape, complex)
+    for k, (across, along) in enumerate(((-y, x - side), (y, -x), (0.0, side))):
+        found.real[:, k], found.imag[:, k] = across * per, along * per
+    return found

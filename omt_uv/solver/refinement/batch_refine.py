@@ -308,8 +308,9 @@ class _ActiveCharts:
         slope = np.bincount(self.of_vertex, down, self.count) / self.share
         far = np.full(self.count, 1 / FOLD_SHARE)
         folds = fold_shares(*faces.derivatives(w), *faces.derivatives(step))
-        if faces.part is not None:
-            folds = np.where(faces.part > 0, folds, np.inf)
+        part = faces.part
+        if part is not None:
+            folds = np.where(part > 0, folds, np.inf)
         np.minimum.at(far, faces.of_triangles(self.of_face), folds)
         share = np.where(continuation.live, FOLD_SHARE * far, 0)
         waiting = continuation.live.copy()

@@ -217,7 +217,8 @@ def _on_outline(
 def _straightened(symmetry: MirrorSymmetry, w: np.ndarray, faces: Elements) -> np.ndarray:
     """A symmetric map w (n,) complex whose folds, if they are few, are straightened where they are; averaging makes
     some where a map varies fast."""
-    triangles = faces.triangles if faces.part is None else faces.triangles[faces.part > 0]
+    part = faces.part
+    triangles = faces.triangles if part is None else faces.triangles[part > 0]
     outline = np.zeros(len(w), bool)
     outline[boundary_edges(triangles)] = True
     for _ in range(ROUNDS):

@@ -174,7 +174,8 @@ def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
     """Some faces (s,), with their corners in the order (s,3)."""
-    triangles, gradient = (np.take_along_axis(x[star], corner, 1) for x in (faces.triangles, faces.gradient))
+    given = faces.triangles[star], faces.gradient_at(star)
+    triangles, gradient = (np.take_along_axis(x, corner, 1) for x in given)
     weight = faces.weight[star]
     # Nobody asks single vertices for the area of the surface.
     return Elements(triangles.astype(np.int32), weight, gradient, faces.ratio[star], weight)
@@ -201,7 +202,7 @@ def relax(
 def _rows(faces: Elements, some: slice) -> Elements:
     """Some of the faces, each a polygon of its own."""
     return Elements(
-        faces.triangles[some], faces.area[some], faces.gradient[some], faces.ratio[some], faces.weight[some]
+        faces.triangles[some], faces.area[some], faces.gradient_at(some), faces.ratio[some], faces.weight[some]
     )
 
 

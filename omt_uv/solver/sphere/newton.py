@@ -150,7 +150,8 @@ class SphereProblem:
             moved = self.symmetry.averaged(moved)
             direction = np.einsum("nd,nad->na", moved, axes)
         far = fold_shares(a, b, *derivatives(self.faces, face.change(moved[self.faces.triangles])))
-        counted = far if self.faces.part is None else far[self.faces.part > 0]
+        part = self.faces.part
+        counted = far if part is None else far[part > 0]
         share = min(1.0, FOLD_SHARE * float(counted.min(initial=np.inf)))
         for _ in range(MAX_HALVINGS):
             trial = retract(positions, axes, share * direction)

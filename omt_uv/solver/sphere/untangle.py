@@ -46,7 +46,7 @@ def untangle_on_sphere(
     """
     # In units of the areas asked for; faces of little area must not fold either.
     even = np.full(len(faces.area), 1 / len(faces.area))
-    faces = replace(faces, gradient=faces.gradient / np.sqrt(faces.ratio)[:, None], weight=(faces.weight + even) / 2)
+    faces = replace(faces, hats=faces.gradient / np.sqrt(faces.ratio)[:, None], weight=(faces.weight + even) / 2)
     most = None
     for k in range(MAX_STEPS):
         folds = int((~(signed_volumes(positions, faces.triangles) > 0)).sum())

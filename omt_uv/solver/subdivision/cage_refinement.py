@@ -16,9 +16,9 @@ from scipy.sparse import csr_matrix, identity, kron, vstack
 from scipy.sparse.linalg import splu
 
 from ..maps.contacts import crossings
-from ..maps.energy import Elements, face_derivatives_of, hat_gradients, squared, sum_at_vertices
+from ..maps.energy import Elements, face_derivatives_of, squared, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
-from ..mesh.geometry import signed_areas
+from ..mesh.geometry import hat_gradients, signed_areas
 from ..mesh.polygon_areas import BOTH
 from ..progress import Progress, Steps, part_of
 from ..refinement.boundary_barrier import BoundaryBarrier, make_barrier

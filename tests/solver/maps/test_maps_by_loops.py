@@ -22,6 +22,7 @@ from omt_uv.solver.maps import (
     polygon_elements,
     upright,
 )
+from omt_uv.solver.mesh import geometry
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 
 
@@ -333,7 +334,7 @@ def test_triangles_are_developed_from_their_parents_frames():
 
 def test_hat_gradients_are_the_slopes_of_hats_and_slivers_have_finite_ones():
     p = np.random.default_rng(0).normal(size=(8, 3, 3))
-    area, gradient = energy.hat_gradients(p.reshape(-1, 3), np.arange(24).reshape(8, 3))
+    area, gradient = geometry.hat_gradients(p.reshape(-1, 3), np.arange(24).reshape(8, 3))
     for t in range(8):
         x = (p[t, 1] - p[t, 0]) / np.linalg.norm(p[t, 1] - p[t, 0])
         n = np.cross(x, p[t, 2] - p[t, 0])
@@ -343,7 +344,7 @@ def test_hat_gradients_are_the_slopes_of_hats_and_slivers_have_finite_ones():
         hats = np.linalg.inv(flat)[:2].T @ [1, 1j]
         np.testing.assert_allclose(gradient[t], hats)
     thin = np.array([[[0, 0, 0], [2, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [5, 0, 0]]], float)
-    area, gradient = energy._hat_gradients(thin)
+    area, gradient = geometry._hat_gradients(thin)
     np.testing.assert_allclose(area, [0.5 * 2 * 2e-9, 0.5 * 1 * 5e-9])
     assert np.isfinite(gradient).all()
 
