@@ -58,6 +58,8 @@ UNROLLED = 1e-4
 # Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
 NO_ROOM = 1e-7
 PARTED = "parts that single edges cut off take more than all of a circle"
+# Coordinates of no vertices.
+NOWHERE = np.zeros((0, 2))
 # What is said, after their number, of faces of a map that is returned all the same.
 FOLDED = "faces are folded or without area in the map"
 
@@ -140,15 +142,17 @@ def map_chart(
     initial = yield from part_of(_initial_map(disk, options.balance, log, draft, goal), *INITIAL)
     with log.timed("refinement"):
         start, places = mirrored_to_pins(initial.uv, pins)
-        asked = None if target is None else disk.target
-        given = {"target": asked, "region": disk.region, "pins": places, "polygons": disk.polygons}
         refined = good_enough(disk, start, draft, initial.apart, goal) if plain else None
         if refined is None:
+            given = {"target": None if target is None else disk.target, "pins": places}
             again = _refinement_options(disk, options, initial, places is None)
-            disk = replace(disk)  # without the maps that were made of it on the way
-            refined = yield from part_of(_refined(disk, start, again, given, log), *REFINEMENT)
-        refined = replace(refined, uv=refined.uv[: len(vertices)])  # centres of polygons were there for the map alone
+            steps = _refined(replace(disk), start, again, given, log)
+            disk, initial, given, start, vertices = _outlined(disk), replace(initial, uv=NOWHERE), {}, NOWHERE, NOWHERE
+            refined = yield from part_of(steps, *REFINEMENT)
+        # Centres of polygons were there for the map alone.
+        refined = replace(refined, uv=refined.uv[: len(chart.vertices)])
     with log.timed("measure"):
+        vertices, unit = in_unit_box(chart.vertices)
         figures = measured_chart(vertices, chart, refined.uv, density)
     if target is not None and options.balance == 0:
         log.warnings += area_error_warnings(figures.area_l1, QUALITIES[options.quality].area_error)
@@ -171,6 +175,13 @@ def _refinement_options(disk: DiskMesh, options: MapOptions, start: InitialChart
         multiplier=start.multiplier,
         order=disk.order,
     )
+
+
+def _outlined(disk: DiskMesh) -> DiskMesh:
+    """What is known of a disk but its mesh, which what refines it has: steps take so much memory that nothing waits for
+    their end twice. It is without the maps that were made of it on the way, too."""
+    none = np.zeros((0, 3), np.int64)
+    return replace(disk, vertices=none, triangles=none, target=none[:, 0], region=None, polygons=None)
 
 
 def _refuse_pins(pins: ChartPins | None, options: MapOptions) -> None:
@@ -371,11 +382,15 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
 def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: dict, log: RunLog) -> Steps[Refinement]:
     """The refined map, with a free boundary where the domain asked for leaves faces folded.
 
-    given : target, region and pins of `refine`
+    given : target and pins of `refine`
     """
     domain = options.boundary
+    given = given | {"region": disk.region, "polygons": disk.polygons}
     try:
-        refined = yield from refine(disk.vertices, disk.triangles, uv, options, **given)
+        steps = refine(disk.vertices, disk.triangles, uv, options, **given)
+        if domain == "free":
+            del disk, uv, given
+        refined = yield from steps
         if domain == "free" or (signed_areas(refined.uv, disk.triangles) > NO_ROOM * disk.target).all():
             return refined
         cause = "faces stay squeezed to nothing"

@@ -21,7 +21,7 @@ from ..freed_memory import give_back_of
 from ..linalg.nested_dissection import mesh_order
 from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
-from ..maps.polygon_elements import polygon_elements
+from ..maps.polygon_elements import energy_in_turn, polygon_elements
 from ..maps.tutte import evened_tutte
 from ..maps.untangle import is_one_to_one, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
@@ -369,7 +369,7 @@ def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool, goal: 
     faces = polygon_elements(disk.vertices, disk.triangles, disk.target, disk.polygons, disk.region)
     w = uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / np.abs(faces.areas(w).sum()))
-    value, error = energy(faces, w, SMOOTH_WEIGHT_FAR), area_error(faces, w)
+    value, error = energy_in_turn(faces, w, SMOOTH_WEIGHT_FAR), area_error(faces, w)
     as_it_is = value < ISOMETRY or (apart and value < UNROLLED and error <= goal and touches_itself(uv, disk.loop))
     if not draft and (disk.boundary != "free" or not as_it_is):
         return None

@@ -6,7 +6,6 @@ growing area weight (`continuation`). The weight ends where the area error is sm
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -176,14 +175,11 @@ def refine(
     give_back_of(len(vertices))
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins, polygons, options.order)
-
-    def make() -> Elements:
-        return polygon_elements(mesh.vertices, mesh.triangles, target, polygons, region)
-
+    asked = _Asked(target, region, polygons)
+    # Whoever called may have let go of it.
+    del vertices, triangles, uv, target, region, polygons
     try:
-        found, faces, warnings = yield from _refined(
-            mesh, make, lambda faces: _by_triangle(mesh, faces, target, region), options, polygons
-        )
+        found, faces, warnings = yield from _refined(mesh, asked, options)
     except MeshError as error:
         raise mesh.original_error(error) from error
     yield Progress("Refinement", 1.0)
@@ -216,29 +212,39 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-def _by_triangle(mesh: Renumbered, faces: Elements, target: np.ndarray, region: np.ndarray | None) -> Elements:
-    """The elements of which each triangle is a polygon of its own."""
-    return faces if faces.polygon is None else elements(mesh.vertices, mesh.triangles, target, region)
+@dataclass
+class _Asked:
+    """What is asked of the triangles of a mesh, see `refine`, as long as elements are made of it."""
+
+    target: np.ndarray
+    region: np.ndarray | None
+    polygons: np.ndarray | None
+
+    def elements(self, mesh: Renumbered) -> Elements:
+        return polygon_elements(mesh.vertices, mesh.triangles, self.target, self.polygons, self.region)
+
+    def by_triangle(self, mesh: Renumbered, faces: Elements) -> Elements:
+        """The elements of which each triangle is a polygon of its own."""
+        return faces if faces.polygon is None else elements(mesh.vertices, mesh.triangles, self.target, self.region)
+
+    def let_go(self) -> None:
+        self.target, self.region, self.polygons = np.zeros(0), None, None
 
 
 def _refined(
-    mesh: Renumbered,
-    make: Callable[[], Elements],
-    triangle_by_triangle: Callable[[Elements], Elements],
-    options: RefinementOptions,
-    polygons: np.ndarray | None,
+    mesh: Renumbered, asked: _Asked, options: RefinementOptions
 ) -> Steps[tuple[ContinuationResult, Elements, tuple[str, ...]]]:
-    """Stages on a renumbered chart, from what makes its elements, and from these those of which each triangle is a
-    polygon: what was found, the elements, and the warnings of the initial map it was found from."""
+    """Stages on a renumbered chart: what was found, the elements, and the warnings of the initial map it was found
+    from."""
     boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
     pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
-    faces = make()
-    by_triangle = triangle_by_triangle(faces)
+    faces = asked.elements(mesh)
+    by_triangle = asked.by_triangle(mesh, faces)
     initial, w = _start(mesh, faces, boundary, loop)
     initial, notches = _with_notches(initial, mesh, by_triangle, loop, options)
     smoother = _smoother(mesh, faces, balance)
     warm = options.warm_start
-    known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
+    known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, asked.polygons, faces)
     parts = sweeping_solver(mesh.vertices, mesh.triangles)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
@@ -264,10 +270,13 @@ def _refined(
         )
     # All of them take the memory of four maps, and are made in less time than a step takes.
     del by_triangle, faces
+    if symmetry is None:
+        asked.let_go()
     ahead = options.prolonged and boundary == "free"
     way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier, ahead)
+    w = w if boundary == "disk" else w[:0].copy()
     found = yield from part_of(way, *STAGES)
-    faces = half if symmetry is None else make()
+    faces = half if symmetry is None else asked.elements(mesh)
     error = area_error(faces, found.w)
     if notches and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(initial, mesh.triangles, loop)

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..maps.contacts import crossings_on_the_way, loop_edges
 from ..maps.energy import Elements, area_error, elements, energies, squared
-from ..mesh.topology import halfedges, order_of_numbers, runs, twins
+from ..mesh.geometry import KEPT_HATS
+from ..mesh.topology import order_of_numbers, runs
 from ..progress import Progress, Steps
 
 # Least eigenvalue of a vertex's Hessian over the greatest.
@@ -74,7 +75,7 @@ def smoothed_uv(
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
     steps = smoothed(faces, w, area_weight, sweeps, goal=goal)
     # They take the memory of six maps, and sweeps have their own.
-    del faces
+    del faces, uv
     w = yield from steps
     return np.column_stack([w.real, w.imag])
 
@@ -128,24 +129,48 @@ class Smoother:
 
 def _sets(faces: Elements, n: int, whole=False):
     """Independent sets of vertices, inner or all: vertices (k,), and the rows (s,) and faces of their stars."""
+    many = len(faces.triangles) > KEPT_HATS
     for vertex, row, star, corner in _stars(faces.triangles, n, whole):
-        yield vertex, row.astype(np.int32), take_faces(faces, star, corner)
+        taken = _Stars(faces, star.astype(np.int32), corner[:, 0].astype(np.int8)) if many else None
+        yield vertex, row.astype(np.int32), taken or take_faces(faces, star, corner)
 
 
 def _stars(F: np.ndarray, n: int, whole=False):
     """Independent sets of vertices, inner or all: vertices (k,); rows, faces (s,) and corners (s,3) of their stars."""
     random = np.random.default_rng(0)
-    inner = np.ones(n, bool)
-    if not whole:
-        tail, head = halfedges(F)
-        boundary = twins(F) < 0
-        inner[tail[boundary]] = inner[head[boundary]] = False
+    inner = np.ones(n, bool) if whole else _inner(F, n)
     for _ in range(SETS):
         chosen = independent_set(F, np.where(inner, random.permutation(n), -1))
         inner &= ~chosen
         star, corner = stars(F, chosen)
         vertex, row = runs(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0])
         yield vertex, row, star, corner
+
+
+def _inner(F: np.ndarray, n: int) -> np.ndarray:
+    """Which of n vertices (n,) bool are on no boundary of an oriented manifold mesh (m,3): their neighbours after them
+    are those before them. Sums of random numbers tell that, in a third of the memory of twins."""
+    number = np.random.default_rng(0).integers(1 << 31, size=n)
+    balance = np.zeros(n)
+    for k in range(3):
+        tail, head = F[:, k], F[:, (k + 1) % 3]
+        balance += np.bincount(tail, number[head], n)
+        balance -= np.bincount(head, number[tail], n)
+    return balance == 0
+
+
+@dataclass(frozen=True)
+class _Stars:
+    """Faces (s,) of stars, and the corners (s,) that they begin with: all that is known of these faces takes several
+    times the memory of a large mesh, and is taken as it is asked for."""
+
+    faces: Elements
+    star: np.ndarray
+    first: np.ndarray
+
+    def taken(self, some: slice) -> Elements:
+        """Some of the faces, as `take_faces`."""
+        return take_faces(self.faces, self.star[some], (self.first[some, None] + np.arange(3)) % 3)
 
 
 def independent_set(F: np.ndarray, rank: np.ndarray) -> np.ndarray:
@@ -174,15 +199,21 @@ def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
     """Some faces (s,), with their corners in the order (s,3)."""
-    given = faces.triangles[star], faces.gradient_at(star)
-    triangles, gradient = (np.take_along_axis(x, corner, 1) for x in given)
+    given, place = (faces.triangles[star], faces.gradient_at(star)), 3 * np.arange(len(star))[:, None] + corner
+    triangles, gradient = (np.take(x, place) for x in given)
     weight = faces.weight[star]
     # Nobody asks single vertices for the area of the surface.
     return Elements(triangles.astype(np.int32), weight, gradient, faces.ratio[star], weight)
 
 
 def relax(
-    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, area_weight: float, steps: int, fixed=False
+    vertex: np.ndarray,
+    row: np.ndarray,
+    faces: Elements | _Stars,
+    w: np.ndarray,
+    area_weight: float,
+    steps: int,
+    fixed=False,
 ) -> None:
     """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
 
@@ -194,13 +225,16 @@ def relax(
     first = np.unique(np.concatenate([row[parts], [len(vertex)]]))
     begin = np.searchsorted(row, first)
     for a, b, c, d in zip(first[:-1], first[1:], begin[:-1], begin[1:], strict=True):
-        some = faces if d - c == len(row) else _rows(faces, slice(c, d))
+        whole = isinstance(faces, Elements) and d - c == len(row)
+        some = faces if whole else _rows(faces, slice(c, d))
         stay = np.broadcast_to(fixed, len(vertex))[a:b]
         _relax(vertex[a:b], row[c:d] - a, some, w, area_weight, steps, stay)
 
 
-def _rows(faces: Elements, some: slice) -> Elements:
+def _rows(faces: Elements | _Stars, some: slice) -> Elements:
     """Some of the faces, each a polygon of its own."""
+    if isinstance(faces, _Stars):
+        return faces.taken(some)
     return Elements(
         faces.triangles[some], faces.area[some], faces.gradient_at(some), faces.ratio[some], faces.weight[some]
     )

@@ -519,7 +519,9 @@ def test_what_a_domain_has_no_room_for_is_mapped_freely(boundary, error, squeeze
     monkeypatch.setattr(chart_maps, "refine", refine)
     monkeypatch.setattr(chart_maps, "mean_value_sites", lambda *_: np.full((9, 2), 5.0))
     options = chart_maps.RefinementOptions(boundary=boundary, balance=0.25, quality="draft")
-    disk = SimpleNamespace(vertices=V, triangles=F, target=np.full(8, 1 / 8), loop=np.arange(3))
+    disk = SimpleNamespace(
+        vertices=V, triangles=F, target=np.full(8, 1 / 8), loop=np.arange(3), region=None, polygons=None
+    )
     log = RunLog()
     steps = chart_maps._refined(disk, V[:, :2], options, {}, log)
     if boundary == "free" and error is not None:

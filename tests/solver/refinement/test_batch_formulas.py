@@ -37,7 +37,7 @@ def together(regions):
         triangles=np.concatenate([of.triangles + at for of, _, at in alone]),
         **{
             name: np.concatenate([getattr(of, name) for of in faces])
-            for name in ("area", "gradient", "ratio", "weight", "region")
+            for name in ("area", "hats", "ratio", "weight", "region")
         },
     )
     charts = object.__new__(batch_refine._ActiveCharts)
