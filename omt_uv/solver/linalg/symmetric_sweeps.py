@@ -51,12 +51,16 @@ class SymmetricSweeps:
 
     def _swept(self, rows: VertexRows, b: np.ndarray, w: np.ndarray, axes) -> np.ndarray | None:
         """The solution; None where it takes too many iterations."""
-        order = rows.pattern.order
-        spread = affine_motions(self._part[order], int(self._part.max()) + 1, w[order], axes()[order])
+        order, count = rows.pattern.order, int(self._part.max()) + 1
+        along = axes()[order]
+        spread = affine_motions(self._part[order], count, w[order], along)
+        plain = bool((along == [1, 1j]).all())
+        del along
         give_back()
-        coarse, gather = self._coarse(rows, spread), spread.T
+        coarse, motions = self._coarse(rows, spread), Motions(spread, plain)
+        del spread
         give_back()
-        precondition = _preconditioner(rows, lambda r: coarse.solve(gather @ r), spread)
+        precondition = _preconditioner(rows, lambda r: coarse.solve(motions.gathered(r)), motions)
         found = by_gradients(rows, b.reshape(-1, 2)[order].ravel(), precondition, MOST)
         if found is None:
             return None
@@ -73,10 +77,41 @@ class SymmetricSweeps:
         return Factor(total + SHIFT * total.diagonal().max() * sp.identity(total.shape[0]), self._order)
 
 
+class Motions:
+    """The affine motions of parts, see `affine_motions`; plain : every vertex may go anywhere, so that both of its
+    unknowns have the same entries, and those of one are kept."""
+
+    def __init__(self, spread: sp.csr_matrix, plain: bool):
+        self._spread, self._plain = spread, plain
+        if plain:
+            n, k = len(spread.indptr) // 2, spread.shape[1] // 2
+            first = spread.indices.reshape(n, 6)[:, :3]
+            # Those of a part are six columns, and three of them are for either axis.
+            columns = (first - 3 * (first // 6)).ravel()
+            entries = spread.data.reshape(n, 6)[:, :3].ravel()
+            self._spread = sp.csr_matrix((entries, columns, 3 * np.arange(n + 1, dtype=np.int32)), shape=(n, k))
+
+    def of(self, motions: np.ndarray) -> np.ndarray:
+        """What all motions (k,) make of the unknowns, (2n,)."""
+        if not self._plain:
+            return self._spread @ motions
+        found = np.empty((self._spread.shape[0], 2))
+        for axis, one in enumerate(motions.reshape(-1, 2, 3).transpose(1, 0, 2)):
+            found[:, axis] = self._spread @ one.ravel()
+        return found.ravel()
+
+    def gathered(self, r: np.ndarray) -> np.ndarray:
+        """What is of each motion (k,) in forces r (2n,)."""
+        if not self._plain:
+            return self._spread.T @ r
+        parts = [(self._spread.T @ side).reshape(-1, 3) for side in r.reshape(-1, 2).T]
+        return np.stack(parts, axis=1).ravel()
+
+
 def _preconditioner(
-    rows: VertexRows, by_parts: Callable[[np.ndarray], np.ndarray], spread: sp.csr_matrix
+    rows: VertexRows, by_parts: Callable[[np.ndarray], np.ndarray], parts: Motions
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A sweep, what parts make of what is left then, as motions to be spread (2n,k), and the sweep back.
+    """A sweep, what parts make of what is left then, as motions of these, and the sweep back.
 
     What earlier colours do to later ones is taken off what is left as they move, what later ones do to earlier ones on
     the way back: either takes half of the matrix.
@@ -106,7 +141,7 @@ def _preconditioner(
                 beyond.reshape(-1, 2)[rows.pattern.rows(k)] -= rows.by_more(x, k)
         motions = by_parts(beyond)
         del beyond
-        moved = spread @ motions
+        moved = parts.of(motions)
         x += moved
         for k in colours:
             rows.to_later(moved, k, left)

@@ -38,6 +38,7 @@ from .polygon_corners import (
     PolygonCorners,
     areas_in_map,
     convex_corners,
+    corners_in_turn,
     straight_share,
 )
 from .polygon_disk import with_fans
@@ -52,6 +53,7 @@ LARGEST = 800
 ROUNDING = 1e-15
 # How far, over its extent, a map may be from its mirror image to be kept symmetric: what is rounded.
 SYMMETRIC = 1e-9
+NO_CORNERS = PolygonCorners(np.zeros((0, 3), np.int64), np.zeros(0, np.int64), *np.zeros((3, 0)))
 # Tries with more and more of the outlines fixed where they would come to cross themselves.
 ATTEMPTS = 5
 
@@ -85,6 +87,8 @@ def keep_convex(
     unit = float(np.abs(np.concatenate(maps)).max())
     w = np.concatenate([uv / unit for _, uv, _ in fans]) @ [1, 1j]
     triangles = np.concatenate([c.triangles + k for c, k in zip(charts, first, strict=False)])
+    if _all_open(surface, charts, triangles, w):
+        return {}
     corners = _mapped_corners(surface, charts, triangles, w)
     if not corners.reflex(w).any():
         return {}
@@ -147,6 +151,8 @@ def _folded_corners(surface: Surface, charts: Sequence[Chart], maps: Sequence[np
     first = np.cumsum([0, *(len(uv) for uv in maps)])
     w = np.concatenate(maps) @ [1, 1j]
     triangles = np.concatenate([c.triangles + k for c, k in zip(charts, first, strict=False)])
+    if _all_open(surface, charts, triangles, w):
+        return NO_CORNERS
     corners = _mapped_corners(surface, charts, triangles, w)
     return corners.of(corners.areas(w) <= 0, np.arange(len(w)))
 
@@ -227,27 +233,50 @@ def _union(charts, first, density, area_weights, spare, w) -> CornerMesh:
 def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.ndarray, w: np.ndarray) -> PolygonCorners:
     """The corners of convex polygons as vertices of all charts, counter-clockwise in the map."""
     corner, polygon, share = convex_corners(surface, straight=True)
-    vertex = np.full(len(surface.corner_vertex), -1)
-    vertex[np.concatenate([c.corners.ravel() for c in charts])] = triangles.ravel()
-    owner = np.concatenate([c.faces for c in charts])
-    area = np.bincount(owner, areas_in_map(triangles, w), len(surface.face_start) - 1)
+    vertex, area = _on_surface(surface, charts, triangles, w)
     ears = vertex[corner]
     kept = (ears >= 0).all(1) & (area[polygon] > 0)
     kept[kept] &= _possible(ears[kept], corner[kept], surface)
-    ears, polygon = ears[kept], polygon[kept]
-    share, whole = share[kept], area[polygon]
-    straight = straight_share(np.diff(surface.face_start)[polygon])
+    found = _as_corners(surface, ears[kept], polygon[kept], share[kept], area)
+    # Polygons may have been turned over for the map.
+    turned = np.bincount(found.polygon, found.areas(w), len(area))[found.polygon] < 0
+    return replace(found, triangles=np.where(turned[:, None], found.triangles[:, [0, 2, 1]], found.triangles))
+
+
+def _on_surface(surface: Surface, charts: Sequence[Chart], triangles, w) -> tuple[np.ndarray, np.ndarray]:
+    """The vertex (k,) of every corner of the surface, -1 for none, and the areas (f,) of its polygons in a map (n,)."""
+    vertex = np.full(len(surface.corner_vertex), -1, np.int32)
+    for c, some in zip(charts, np.split(triangles, np.cumsum([len(c.triangles) for c in charts])[:-1]), strict=True):
+        vertex[c.corners] = some
+    owner = np.concatenate([c.faces for c in charts])
+    return vertex, np.bincount(owner, areas_in_map(triangles, w), len(surface.face_start) - 1)
+
+
+def _as_corners(surface: Surface, ears: np.ndarray, polygon: np.ndarray, share: np.ndarray, area) -> PolygonCorners:
+    """Corners (k,3) of polygons (k,) of which they have a share (k,); area (f,) : of all polygons in the map."""
+    whole = area[polygon]
+    straight = straight_share(surface.face_start[polygon + 1] - surface.face_start[polygon])
     kept_share = np.maximum(share, straight)
-    found = PolygonCorners(
+    return PolygonCorners(
         triangles=ears,
         polygon=polygon,
         target=kept_share * whole,
         whole=whole,
         least=np.where(share < straight, share - DENTED, CONVEX * kept_share) * whole,
     )
-    # Polygons may have been turned over for the map.
-    turned = np.bincount(polygon, found.areas(w), len(area))[polygon] < 0
-    return replace(found, triangles=np.where(turned[:, None], ears[:, [0, 2, 1]], ears))
+
+
+def _all_open(surface: Surface, charts: Sequence[Chart], triangles: np.ndarray, w: np.ndarray) -> bool:
+    """Whether no corner of a convex polygon is reflex in a map w (n,) complex, and none has to be left out to see that:
+    corners are looked at some after the others, as all of them take several times the memory of the mesh."""
+    vertex, area = _on_surface(surface, charts, triangles, w)
+    for corner, polygon, share in corners_in_turn(surface, straight=True):
+        ears = vertex[corner]
+        kept = (ears >= 0).all(1) & (area[polygon] > 0)
+        found = _as_corners(surface, ears[kept], polygon[kept], share[kept], area)
+        if not (found.areas(w) > np.maximum(found.least, 0)).all():
+            return False
+    return True
 
 
 def _possible(ears: np.ndarray, corner: np.ndarray, surface: Surface) -> np.ndarray:

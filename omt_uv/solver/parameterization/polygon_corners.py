@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ STRAIGHT = 0.02
 FLATTER = 0.3
 # Straight ones are reflex only where they have lost this share of the area: straight lines may stay so.
 DENTED = 0.01
+# Polygons whose corners are looked at together, so few that what is computed of them stays in the cache.
+POLYGONS = 1 << 13
 # Maps (n,) whose corners were forced open, by what they were found from.
 Forced = dict[tuple[bytes, ...], np.ndarray]
 
@@ -125,33 +128,43 @@ def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray
     Triangles (k,3) of a corner of the surface, the next and the one before it; their polygons (k,), and their shares
     (k,) of the polygons' areas.
     """
+    corner, polygon, share = zip(*corners_in_turn(surface, straight), strict=True)
+    return np.concatenate(corner), np.concatenate(polygon), np.concatenate(share)
+
+
+def corners_in_turn(surface: Surface, straight: bool) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """`convex_corners` of some polygons after the others: those of all take several times the memory of a mesh."""
     size = np.diff(surface.face_start)
+    used = np.zeros(len(surface.positions), bool)
+    used[surface.corner_vertex[np.repeat(size > 3, size)]] = True
+    # Differences over an extent, so that neither place nor unit costs digits.
+    extent = np.ptp(surface.positions[used] / 2, axis=0).max() if used.any() else 0.0
+    unit = max(float(extent), float(np.finfo(float).tiny))
+    for begin in range(0, max(len(size), 1), POLYGONS):
+        yield _corners_of(surface, begin + np.arange(len(size[begin : begin + POLYGONS])), unit, straight)
+
+
+def _corners_of(
+    surface: Surface, faces: np.ndarray, unit: float, straight: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`convex_corners` of some polygons (f,) that follow each other, in a unit."""
+    size = surface.face_start[faces + 1] - surface.face_start[faces]
     polygon = np.repeat(np.arange(len(size)), size)
     here = np.flatnonzero(size[polygon] > 3)
     polygon = polygon[here]
-    first, last = surface.face_start[polygon], surface.face_start[polygon + 1] - 1
+    here += surface.face_start[faces[0]] if len(faces) else 0
+    first, last = surface.face_start[faces[polygon]], surface.face_start[faces[polygon] + 1] - 1
     corner = np.column_stack([here, np.where(here == last, first, here + 1), np.where(here == first, last, here - 1)])
-    used = surface.positions[surface.corner_vertex[here]] / 2
-    # Differences over an extent, so that neither place nor unit costs digits.
-    unit = np.maximum(np.ptp(used, axis=0).max(initial=0.0), np.finfo(float).tiny)
 
     def between(some, others):
         p, q = (surface.positions[surface.corner_vertex[x]] for x in (some, others))
         return (p / 2 - q / 2) / unit
 
-    def doubled(corner, first):
-        return cross3(between(corner[:, 0], first), between(corner[:, 1], corner[:, 0]))
-
-    twice = part_by_part(doubled, corner, first)
+    twice = cross3(between(corner[:, 0], first), between(corner[:, 1], corner[:, 0]))
     sums = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])
-    del twice, used
-
-    def shares(corner, polygon):
-        normal = sums[polygon]
-        ear = cross3(between(corner[:, 1], corner[:, 0]), between(corner[:, 2], corner[:, 0]))
-        return (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
-
-    share = part_by_part(shares, corner, polygon)
+    normal = sums[polygon]
+    ear = cross3(between(corner[:, 1], corner[:, 0]), between(corner[:, 2], corner[:, 0]))
+    share = (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
     reflex = np.bincount(polygon, share < (-straight_share(size[polygon]) if straight else -SHARP), len(size)) > 0
     kept = ~reflex[polygon] & (straight | (share > SHARP))
-    return corner[kept], polygon[kept], share[kept]
+    return corner[kept], faces[polygon[kept]], share[kept]

@@ -6,6 +6,7 @@ Vertices are free, slide on a curve, or stay. No step folds a face (Smith, Schae
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -197,8 +198,16 @@ def newton_steps(
     frame, free = problem.motion.frame(w), problem.motion.free
     matrix, slopes, scale = _equations(problem, w, pressure, frame, free.astype(float))
     parts = problem.assembly.parts if np.max(problem.area_weight) <= STIFF else None
-    step = -_solution(matrix, slopes, scale, parts, w, lambda: frame[:, None] * [1, 1j] * free, problem.assembly.order)
+    # Frames take as much memory as a map, and are made in no time.
+    del frame
+    axes = partial(_axes, problem.motion, w)
+    step = -_solution(matrix, slopes, scale, parts, w, axes, problem.assembly.order)
     return step.view(complex), slopes.view(complex)
+
+
+def _axes(motion: Motion, w: np.ndarray) -> np.ndarray:
+    """The directions (n,2) complex that the unknowns of the vertices stand for, 0 for those that stay."""
+    return motion.frame(w)[:, None] * [1, 1j] * motion.free
 
 
 def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[Matrix, np.ndarray, float]:
