@@ -18,6 +18,7 @@ from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
 from ..mesh.geometry import cross2, cross3, face_areas, lengths, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quads
 from ..mesh.topology import graph_components
+from .energy import AT_ONCE
 from .overlap import overlap_share
 
 SHEAR_CAP = 1e6  # a face squashed onto a line must not drown the mean of all others
@@ -110,13 +111,15 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -
     area, real = _surface_area(V, F, polygons)
     polygons = _counted(polygons)
     target = area if density is None else area * np.asarray(density, float)
-    faces = _measure_faces(_Triangles(V, F[real], uv[real], target[real]), None if polygons is None else polygons[real])
+    measured = _Triangles(V, *(_of_real(x, real) for x in (F, uv, target)))
+    del F, target, area
+    faces = _measure_faces(measured, None if polygons is None else _of_real(polygons, real))
     w, ratio, good = faces.weight, faces.ratio, ~faces.folded
     octaves = np.abs(np.log2(np.maximum(ratio, RATIO_FLOOR)))
     r_good, sheared = ratio[good], ~faces.turned
     w_sheared, s_sheared = w[sheared], faces.shear[sheared]
     any_sheared = bool(sheared.any())
-    corners = uv[real].reshape(-1, 2)
+    corners = measured.uv.reshape(-1, 2)
     return Distortion(
         faces=len(w),
         charts=faces.charts,
@@ -129,7 +132,7 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -
         angle_p99=_weighted_quantile(s_sheared, w_sheared, 0.99) if any_sheared else 0.0,
         seed_area=float((r_good + 1 / r_good).mean()) if len(r_good) else None,
         seed_angle=float((s_sheared + 1 / s_sheared).mean()) if any_sheared else None,
-        overlap=overlap_share(uv[real]) if overlap else None,
+        overlap=overlap_share(measured.uv) if overlap else None,
         uv_min=tuple(corners.min(0).tolist()),
         uv_max=tuple(corners.max(0).tolist()),
         finite=True,
@@ -175,6 +178,11 @@ def _checked(V, F, uv, polygons):
     return V, F, uv, polygons
 
 
+def _of_real(values: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Values (m, ...) of those triangles (m,) bool; of a large mesh a copy takes as much memory as the map."""
+    return values if real.all() else values[real]
+
+
 def _names(polygons: np.ndarray | None, chosen: np.ndarray) -> np.ndarray:
     """Numbers of the faces of chosen triangles (m,) bool."""
     return np.flatnonzero(chosen) if polygons is None else np.unique(polygons[chosen])
@@ -207,20 +215,20 @@ def _measure_faces(mesh: _Triangles, polygons) -> _FaceFigures:
     """Figures of the faces of a map: of its triangles, or of polygons (m,)."""
     uv = mesh.uv
     charts, chart = uv_charts(mesh.F, uv)
-    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    uv_area = 0.5 * cross2(a, b)
-    mirrored = np.bincount(chart, uv_area, charts) < 0
-    signed = np.where(mirrored[chart], -uv_area, uv_area)
+    uv_area = part_by_part(lambda some: 0.5 * cross2(some[:, 1] - some[:, 0], some[:, 2] - some[:, 0]), uv)
+    mirrored = (np.bincount(chart, uv_area, charts) < 0)[chart]
+    del chart
+    signed = np.where(mirrored, -uv_area, uv_area)
     if polygons is not None:
-        return _measure_polygons(
-            mesh, signed, mirrored[chart], np.unique(polygons, return_inverse=True)[1].ravel(), charts
-        )
+        del uv_area
+        counted = np.unique(polygons, return_inverse=True)[1].ravel().astype(np.int32)
+        return _measure_polygons(mesh, signed, mirrored, counted, charts)
     weight = mesh.target / mesh.target.sum()
     ratio = signed / max(np.abs(uv_area).sum(), np.finfo(float).tiny) / weight
     return _FaceFigures(
         weight=weight,
         ratio=ratio,
-        shear=shear_of(mesh.V, mesh.F, a, b),
+        shear=shear_of(mesh.V, mesh.F, uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]),
         folded=ratio <= 0,
         turned=ratio <= 0,
         charts=charts,
@@ -252,33 +260,42 @@ def _shear_of_polygons(mesh: _Triangles, polygons, mirrored) -> tuple[np.ndarray
     Of a quad the four triangles of both diagonals count, of other polygons those given. Where all are turned, the mean
     is over all of them.
     """
-    square = quads(mesh.F, polygons)
+    square = quads(mesh.F, polygons).astype(np.int32)
     alone = np.ones(len(mesh.F), bool)
-    rows = square // 3
-    alone[rows[:, :2]] = False
-    corner = np.concatenate([np.arange(mesh.F.size).reshape(-1, 3)[alone], square[:, BOTH].reshape(-1, 3)])
+    alone[square[:, :2] // 3] = False
+    lone, count = int(alone.sum()), int(polygons.max()) + 1
+    single = (3 * np.flatnonzero(alone)[:, None] + np.arange(3)).astype(np.int32)
+    corner = np.concatenate([single, square[:, BOTH].reshape(-1, 3)])
+    del alone, square
     area = part_by_part(lambda some: face_areas(mesh.V, mesh.F.ravel()[some]), corner)
     real = area > NEGLIGIBLE_AREA * area.sum()
-    corner, area = corner[real], area[real]
-    of, flip = polygons[corner[:, 0] // 3], mirrored[corner[:, 0] // 3]
-    least = np.where(np.flatnonzero(real) < alone.sum(), 0, VANISHED)
-    double, shear = part_by_part(lambda some: _double_areas_and_shear(mesh, some), corner).T
+    corner, area, given = _of_real(corner, real), _of_real(area, real), int(real[:lone].sum())
+    has, shear = np.empty(len(area)), np.empty(len(area))
+    for begin in range(0, len(area), AT_ONCE):
+        here = slice(begin, begin + AT_ONCE)
+        has[here], shear[here] = _double_areas_and_shear(mesh, corner[here])
+    of = corner[:, 0] // 3
+    del corner
+    has *= np.where(mirrored[of], -1, 1)
+    of = polygons[of]
     # A triangle that is about to turn over says no more of its quad than one that has.
-    has = double * np.where(flip, -1, 1)
-    forward = has > least * area * max(np.abs(has).sum(), np.finfo(float).tiny) / area.sum()
-    count = int(polygons.max()) + 1
+    total = max(float(np.abs(has).sum()), float(np.finfo(float).tiny))
+    forward = np.empty(len(area), bool)
+    for here, least in ((slice(given), 0), (slice(given, None), VANISHED)):
+        forward[here] = has[here] > least * area[here] * total / area.sum()
+    del has
     turned = np.bincount(of, forward, count) == 0
-    weight = np.where(forward | turned[of], area, 0)
-    total = np.bincount(of, weight, count)
-    mean = np.bincount(of, weight * shear, count)
-    return np.divide(mean, total, out=np.ones(count), where=total > 0), turned
+    area[~(forward | turned[of])] = 0
+    total = np.bincount(of, area, count)
+    area *= shear
+    return np.divide(np.bincount(of, area, count), total, out=np.ones(count), where=total > 0), turned
 
 
-def _double_areas_and_shear(mesh: _Triangles, corner: np.ndarray) -> np.ndarray:
-    """Twice the signed UV areas of triangles of these corners (k,3) of a mesh, and their shear s1/s2: (k,2)."""
+def _double_areas_and_shear(mesh: _Triangles, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Twice the signed UV areas of triangles of these corners (k,3) of a mesh, and their shear s1/s2: (k,) each."""
     F, uv = mesh.F.ravel()[corner], mesh.uv.reshape(-1, 2)[corner]
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return np.column_stack([cross2(a, b), shear_of(mesh.V, F, a, b)])
+    return cross2(a, b), shear_of(mesh.V, F, a, b)
 
 
 def shear_of(V, F, a, b):
@@ -307,10 +324,15 @@ def uv_charts(F, uv):
     """Number of charts and chart (m,) of every face: faces are joined by edges with equal UVs at both ends."""
     T = F if _is_one_to_a_vertex(F, uv) else _welded_corners(F, uv)
     i, j = T.ravel(), T[:, [1, 2, 0]].ravel()
-    edge = np.minimum(i, j) * F.size + np.maximum(i, j)
+    edge = np.minimum(i, j) * F.size
+    edge += np.maximum(i, j)
+    del i, j
     order = np.argsort(edge)
-    same = edge[order][1:] == edge[order][:-1]
-    face = np.repeat(np.arange(len(F)), 3)[order]
+    edge = edge[order]
+    same = edge[1:] == edge[:-1]
+    del edge
+    face = (order // 3).astype(np.int32)
+    del order
     return graph_components(face[1:][same], face[:-1][same], len(F))
 
 
