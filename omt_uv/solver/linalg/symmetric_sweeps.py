@@ -35,6 +35,10 @@ class SymmetricSweeps:
         self._order: np.ndarray | None = None
         self._parts: AdditiveSchwarz | None = None
 
+    def hold(self, triangles: np.ndarray) -> None:
+        """Hold other triangles (k,3) that join the same vertices and more, since they are there anyway."""
+        self._mesh = self._mesh[0], triangles
+
     def solve(self, rows: VertexRows, b: np.ndarray, w: np.ndarray, axes: Callable[[], np.ndarray]) -> np.ndarray:
         """About the solution x (2n,) of rows x = b, symmetric positive definite; b.x > 0.
 

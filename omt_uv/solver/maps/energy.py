@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import gradients_of, kept_hats
+from ..mesh.geometry import Sides, kept_hats
 
 # A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
 SHARE_ERROR = 2.7
@@ -58,7 +58,7 @@ class Elements:
     """Polygons of a surface, and the triangles on which their shear is measured, ready for the energy.
 
     triangles (m,3); hats (m,3), the gradients of the hat functions in each triangle's own plane, complex, or, of many,
-    what `gradients_of` makes them of. Of every polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface area; weight (p,) in the
+    what makes them. Of every polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface area; weight (p,) in the
     energy, summing to 1; region (p,) in [0, 1], weights of a region whose share shall be exact, if there is one.
     polygon (m,): whose triangle each is, None where each is a polygon of its own; lone (k,): how much of its polygon's
     area each stands for that is none of a quad's; quads: those of the last triangles, four each.
@@ -66,7 +66,7 @@ class Elements:
 
     triangles: np.ndarray
     area: np.ndarray
-    hats: np.ndarray
+    hats: np.ndarray | Sides
     ratio: np.ndarray
     weight: np.ndarray
     region: np.ndarray | None = None
@@ -81,8 +81,12 @@ class Elements:
 
     def gradient_at(self, here) -> np.ndarray:
         """`gradient` of some triangles (k,), a slice or their numbers."""
-        some = self.hats[here]
-        return some if np.iscomplexobj(some) else gradients_of(some)
+        return self.hats.gradient(here) if isinstance(self.hats, Sides) else self.hats[here]
+
+    def let_go(self) -> None:
+        """Hold of many gradients nothing until they are asked for."""
+        if isinstance(self.hats, Sides):
+            self.hats.let_go()
 
     @property
     def part(self) -> np.ndarray | None:

@@ -294,14 +294,40 @@ def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
     return area, gradient
 
 
-def kept_hats(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Areas (m,) of triangles (m,3), and their gradients (m,3), or what `gradients_of` makes these of where they are many."""
+class Sides:
+    """What `gradients_of` makes the gradients of hat functions of, of triangles (m,3) with corners at (n,3). It is let
+    go while other things take all memory there is, and found again, to the bit, when it is asked for."""
+
+    def __init__(self, positions: np.ndarray, triangles: np.ndarray):
+        self._mesh = positions, triangles
+        self.area, self._sides = self._found()
+
+    def gradient(self, here: slice | np.ndarray) -> np.ndarray:
+        """The gradients (k,3) complex of some triangles."""
+        if self._sides is None:
+            _, self._sides = self._found()
+        return gradients_of(self._sides[here])
+
+    def let_go(self) -> None:
+        """Hold nothing until it is asked for."""
+        self._sides = None
+
+    def _found(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Areas (m,), and the sides (m,3)."""
+        positions, triangles = self._mesh
+        area, sides = np.empty(len(triangles)), np.empty((len(triangles), 3))
+        for begin in range(0, len(triangles), HATS_AT_ONCE):
+            here = slice(begin, begin + HATS_AT_ONCE)
+            area[here], sides[here] = _sides(positions[triangles[here]])
+        return area, sides
+
+
+def kept_hats(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray | Sides]:
+    """Areas (m,) of triangles (m,3), and their gradients (m,3), or what makes these where they are many."""
     if len(triangles) <= KEPT_HATS:
         return hat_gradients(positions, triangles)
-    area, sides = np.empty(len(triangles)), np.empty((len(triangles), 3))
-    for begin in range(0, len(triangles), HATS_AT_ONCE):
-        here = slice(begin, begin + HATS_AT_ONCE)
-        area[here], sides[here] = _sides(positions[triangles[here]])
+    sides = Sides(positions, triangles)
+    area, sides.area = sides.area, np.zeros(0)
     return area, sides
 
 

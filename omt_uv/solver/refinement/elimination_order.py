@@ -5,7 +5,7 @@ Neighbours in the order are neighbours in memory.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,10 @@ class Renumbered:
     pins: Pins | None
     order: np.ndarray
     mirror: np.ndarray
+
+    def bare(self) -> Renumbered:
+        """The map, and what leads back from it, without the mesh."""
+        return replace(self, vertices=self.vertices[:0].copy(), triangles=self.triangles[:0].copy())
 
     def original(self, w: np.ndarray) -> np.ndarray:
         """A map w (n,) complex as UVs (n,2) of the mesh as it was."""

@@ -368,10 +368,10 @@ def _in_axes(blocks: np.ndarray, triangles: np.ndarray, frame, free, symmetry: M
     """Bring blocks (6,6,m) of triangles (m,3), in place, into the axes of their vertices, or of those these follow;
     these vertices (m,3)."""
     found = triangles if symmetry is None else symmetry.representative[triangles]
-    plain = (frame == 1) & free.all(axis=1)
+    plain = (frame[found] == 1) & free[found].all(axis=2)
     if symmetry is not None:
-        plain = plain[symmetry.representative] & ~symmetry.flip & (symmetry.factor == 1)
-    turned = np.flatnonzero(~plain[triangles].all(axis=1))
+        plain &= ~symmetry.flip[triangles] & (symmetry.factor[triangles] == 1)
+    turned = np.flatnonzero(~plain.all(axis=1))
     if not len(turned):
         return found
     # Rows of linear forms that say 1 and i, as forms of the steps along the axes.

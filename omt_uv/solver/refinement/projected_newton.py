@@ -56,7 +56,7 @@ class FreeMotion:
 
     def frame(self, w):
         """1 for every vertex, (n,) complex: the axes are those of the plane."""
-        return np.ones(len(w), complex)
+        return np.broadcast_to(np.ones((), complex), len(w))
 
     def bend(self, w, gradient):
         """0 for every vertex, (n,): the axes are straight."""
@@ -196,10 +196,12 @@ def newton_steps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Step (n,) complex in the axes of the motion's frame, and the slopes (n,) complex of the energy along these."""
     frame, free = problem.motion.frame(w), problem.motion.free
-    matrix, slopes, scale = _equations(problem, w, pressure, frame, free.astype(float))
+    matrix, slopes, scale = _equations(problem, w, pressure, frame, free)
     parts = problem.assembly.parts if np.max(problem.area_weight) <= STIFF else None
     # Frames take as much memory as a map, and are made in no time.
     del frame
+    if isinstance(matrix, VertexRows):
+        problem.faces.let_go()
     axes = partial(_axes, problem.motion, w)
     step = -_solution(matrix, slopes, scale, parts, w, axes, problem.assembly.order)
     return step.view(complex), slopes.view(complex)
@@ -225,7 +227,7 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
         square = linear.T @ linear
         more = square if more is None else more + square
     axes = (gradient * frame.conj()).view(float).reshape(n, 2) * free
-    diagonal = 1 - free
+    diagonal = 1.0 - free
     diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
     return found.matrix(diagonal.ravel() + SHIFT * scale, more), axes.ravel(), scale
 

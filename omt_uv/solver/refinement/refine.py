@@ -178,8 +178,9 @@ def refine(
     asked = _Asked(target, region, polygons)
     # Whoever called may have let go of it.
     del vertices, triangles, uv, target, region, polygons
+    steps, mesh = _refined(mesh, asked, options), mesh.bare()
     try:
-        found, faces, warnings = yield from _refined(mesh, asked, options)
+        found, faces, warnings = yield from steps
     except MeshError as error:
         raise mesh.original_error(error) from error
     yield Progress("Refinement", 1.0)
@@ -272,6 +273,9 @@ def _refined(
     del by_triangle, faces
     if symmetry is None:
         asked.let_go()
+        if parts is not None:
+            parts.hold(half.triangles)
+        mesh = mesh if boundary == "disk" else mesh.bare()
     ahead = options.prolonged and boundary == "free"
     way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier, ahead)
     w = w if boundary == "disk" else w[:0].copy()
