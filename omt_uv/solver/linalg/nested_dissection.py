@@ -17,6 +17,8 @@ from .sparse import minimum_degree
 LARGE = 100_000
 # Parts of this many vertices are not halved any more.
 LEAF = 16
+# Edges that are looked at together.
+AT_ONCE = 100_000
 
 
 class Dissection:
@@ -30,11 +32,14 @@ class Dissection:
 
     def order(self, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
         """Elimination order (n,), `order[k]` the k-th unknown, of the graph with the edges tail, head (e,)."""
-        a, b = self.part[tail], self.part[head]
-        # The first level at which the two ends part; the greater number is the upper half.
-        parting = self.depth - np.frexp((a ^ b).astype(float))[1]
         level = np.full(len(self.part), self.depth)
-        np.minimum.at(level, np.where(a > b, tail, head), parting)
+        # Some after the others: what is found of all edges takes more memory than the mesh.
+        for begin in range(0, len(tail), AT_ONCE):
+            here = slice(begin, begin + AT_ONCE)
+            a, b = self.part[tail[here]], self.part[head[here]]
+            # The first level at which the two ends part; the greater number is the upper half.
+            parting = self.depth - np.frexp((a ^ b).astype(float))[1]
+            np.minimum.at(level, np.where(a > b, tail[here], head[here]), parting)
         # A separator comes when its part has been eliminated, the smaller ones first.
         below = self.depth - level
         return np.lexsort((below, ((self.part >> below) + 1) << below))

@@ -38,9 +38,9 @@ class RowPattern:
         place = np.empty(n, np.int32)
         place[self.order] = np.arange(n)
         self.first = np.concatenate([[0], np.cumsum(np.bincount(colour))])
-        sides = place[np.stack(np.divmod(key, n))]
-        row, column = sides.min(axis=0), sides.max(axis=0)
-        del sides
+        one, other = place[key // n], place[key % n]
+        row, column = np.minimum(one, other), np.maximum(one, other)
+        del one, other
         by_row = np.argsort(row.astype(np.int64) * n + column)
         self.start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=n))]).astype(np.int32)
         row, column = row[by_row], column[by_row]
@@ -84,7 +84,9 @@ def _colours(key: np.ndarray, n: int) -> np.ndarray:
     both = np.concatenate([key, other * n + one, np.arange(n, dtype=np.int64) * (n + 1)])
     del one, other
     both.sort()
-    tail, head = (x.astype(np.int32) for x in np.divmod(both, n))
+    tail = (both // n).astype(np.int32)
+    both %= n
+    head = both.astype(np.int32)
     del both
     degree = np.bincount(tail, minlength=n)
     return coloured(np.cumsum(degree) - degree, tail, head)
@@ -97,7 +99,7 @@ def coloured(start: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarra
     itself among them
     """
     n = len(start)
-    rank = np.random.default_rng(0).permutation(n)
+    rank = np.random.default_rng(0).permutation(n).astype(np.int32)
     colour, taken = np.full(n, -1), np.zeros(n, np.int64)
     while True:
         left = colour < 0

@@ -46,13 +46,14 @@ class PolygonMesh:
         return int(self.polygon.max(initial=-1)) + 1 + len(self.quads)
 
     def every_triangle(self) -> np.ndarray:
-        """All triangles (m,3) whose shear may be measured: four of each quad come last."""
-        return np.concatenate([self.triangles, self.quads[:, BOTH].reshape(-1, 3)])
+        """All triangles (m,3), int32, whose shear may be measured: four of each quad come last."""
+        given, four = (x.astype(np.int32, copy=False) for x in (self.triangles, self.quads))
+        return np.concatenate([given, four[:, BOTH].reshape(-1, 3)])
 
     def of_polygons(self) -> np.ndarray:
-        """The polygon (m,) of each of `every_triangle`."""
-        first = self.count - len(self.quads)
-        return np.concatenate([self.polygon, np.repeat(first + np.arange(len(self.quads)), 4)])
+        """The polygon (m,), int32, of each of `every_triangle`."""
+        of_quads = np.arange(self.count - len(self.quads), self.count, dtype=np.int32)
+        return np.concatenate([self.polygon.astype(np.int32), np.repeat(of_quads, 4)])
 
     def given(self, values: np.ndarray) -> np.ndarray:
         """Values (m,) of the triangles of the mesh summed over the polygons, (p,)."""
@@ -101,8 +102,7 @@ def polygon_elements(
     if faces is None or len(np.unique(faces)) == len(faces):
         return elements(positions, triangles, target, region)
     mesh = polygon_mesh(triangles, faces)
-    # What is kept takes half of the memory that it is computed in.
-    every, polygon = mesh.every_triangle().astype(np.int32), mesh.of_polygons().astype(np.int32)
+    every, polygon = mesh.every_triangle(), mesh.of_polygons()
     area, hats = kept_hats(positions, every)
     q = len(mesh.quads)
     share = np.ones(len(every))

@@ -20,7 +20,7 @@ from ..errors import (
 )
 from .gluing import Gluing, components, corner_classes
 from .surface import Surface, strict_gluing
-from .topology import boundary_loops, graph_components, halfedges, pair_keys
+from .topology import boundary_loops, graph_components, halfedges, order_of_pairs, pair_keys
 
 
 @dataclass(frozen=True)
@@ -190,14 +190,17 @@ def sound_disks(charts: Sequence[Chart]) -> np.ndarray:
     first = np.cumsum([0, *(len(c.vertices) for c in charts)])
     disks = [c.disk for c in charts]
     of_face = np.repeat(np.arange(count), [len(d) for d in disks])
-    triangles = np.concatenate(disks) + first[of_face][:, None]
+    triangles = disks[0] if count == 1 else np.concatenate(disks) + first[of_face][:, None]
     tail, head = halfedges(triangles)
-    _, index, label, shared = np.unique(
-        pair_keys(tail, head), return_index=True, return_inverse=True, return_counts=True
-    )
+    keys = pair_keys(tail, head)
+    order = order_of_pairs(keys)
+    keys = keys[order]
+    begin = np.flatnonzero(np.concatenate([[True], keys[1:] != keys[:-1]]))
+    shared = np.diff(begin, append=len(keys))
+    del keys
     wrong = np.zeros(count, bool)
-    wrong[of_face[index[shared > 2] // 3]] = True
-    boundary = np.flatnonzero(shared[label.ravel()] != 2)
+    wrong[of_face[order[begin[shared > 2]] // 3]] = True
+    boundary = np.sort(order[np.repeat(shared != 2, shared)])
     of_boundary = of_face[boundary // 3]
     # Every loop once, by its least vertex.
     _, loop = graph_components(tail[boundary], head[boundary], int(first[-1]))

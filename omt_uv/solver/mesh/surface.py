@@ -17,7 +17,7 @@ from ..errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .geometry import cross3
+from .geometry import cross3, part_by_part
 from .gluing import Gluing, polygon_gluing
 from .topology import next_corners, pair_keys, pair_up, row_labels
 
@@ -105,20 +105,25 @@ def degenerate_triangles(
     flat : share of the square of its longest side that the area of a line does not exceed; owner (m,) : ascending from
     0, of triangles that only count next to those of the same one
     """
-    p = positions[triangles]
+    area, size = part_by_part(lambda some: _relative_areas(positions[some]), triangles).T
+    begin = np.zeros(1, np.int64) if owner is None else np.searchsorted(owner, np.arange(int(owner[-1]) + 1))
+    high, low = (
+        reduced.reduceat(part_by_part(lambda some, of=reduced: of.reduce(positions[some], axis=1), triangles), begin)
+        for reduced in (np.maximum, np.minimum)
+    )
+    extent = (high / 2 - low / 2).max(axis=1)
+    extent = extent[0] if owner is None else extent[owner]
+    return (area <= flat) | (size <= 1e-9 * extent)
+
+
+def _relative_areas(p: np.ndarray) -> np.ndarray:
+    """Areas of triangles with corners (m,3,3) over the squares of their sizes, and these sizes: (m,2)."""
     # Halves: the difference of two huge numbers may be infinite.
     side = p / 2 - p[:, :1] / 2
     size = np.abs(side).max(axis=(1, 2))
     # Scaling first keeps tiny and huge meshes clear of underflow and overflow.
     side = side / np.where(size > 0, size, 1)[:, None, None]
-    area = 0.5 * np.linalg.norm(cross3(side[:, 1], side[:, 2]), axis=1)
-    if owner is None:
-        extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
-    else:
-        begin = np.searchsorted(owner, np.arange(int(owner[-1]) + 1))
-        high, low = np.maximum.reduceat(p.max(axis=1), begin), np.minimum.reduceat(p.min(axis=1), begin)
-        extent = (high / 2 - low / 2).max(axis=1)[owner]
-    return (area <= flat) | (size <= 1e-9 * extent)
+    return np.stack([0.5 * np.linalg.norm(cross3(side[:, 1], side[:, 2]), axis=1), size], axis=1)
 
 
 def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:

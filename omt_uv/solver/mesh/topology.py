@@ -31,8 +31,12 @@ def next_corners(face_start: np.ndarray) -> np.ndarray:
 
 def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """One int64 key (k,) per unordered pair of integers a, b (k,) from 0 to 2^31 - 1."""
-    a, b = a.astype(np.int64), b.astype(np.int64)
-    return (np.minimum(a, b) << 32) | np.maximum(a, b)
+    a, b = (x.astype(np.int64, copy=False) for x in (a, b))
+    keys = np.minimum(a, b)
+    # In place: of the sides of a large mesh each of these takes as much memory as its triangles.
+    keys <<= 32
+    keys |= np.maximum(a, b)
+    return keys
 
 
 def paired(keys: np.ndarray) -> np.ndarray:
@@ -55,11 +59,13 @@ def row_labels(rows: np.ndarray) -> np.ndarray:
 def order_of_pairs(keys: np.ndarray) -> np.ndarray:
     """The stable ascending order (k,) of keys (k,) of `pair_keys`; by counting, in linear time, where they are many."""
     if len(keys) > FEW_PAIRS:
-        larger = (keys & 0xFFFFFFFF).astype(np.int32)
+        larger = np.empty(len(keys), np.int32)
+        np.bitwise_and(keys, 0xFFFFFFFF, out=larger, casting="unsafe")
         most = int(larger.max())
         if most < 2 * len(keys):
             order = _counted(larger, most)
-            return order[_counted((keys >> 32).astype(np.int32)[order], most)].astype(np.int64)
+            smaller = np.right_shift(keys, 32, out=larger, casting="unsafe")[order]
+            return order[_counted(smaller, most)].astype(np.int64)
     return np.argsort(keys, kind="stable")
 
 
@@ -128,9 +134,8 @@ def first_of(label: np.ndarray) -> np.ndarray:
 
 def twins(triangles: np.ndarray) -> np.ndarray:
     """Opposite halfedge of every halfedge, (3m,), -1 on the boundary, of an oriented manifold mesh (m,3)."""
-    tail, head = halfedges(triangles)
-    first, second = pair_up(pair_keys(tail, head))
-    twin = np.full(len(tail), -1, dtype=np.int64)
+    first, second = pair_up(pair_keys(*halfedges(triangles)))
+    twin = np.full(triangles.size, -1, dtype=np.int64)
     twin[first], twin[second] = second, first
     return twin
 

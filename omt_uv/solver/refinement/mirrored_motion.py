@@ -58,7 +58,7 @@ def find_symmetry(
 ) -> MirrorSymmetry | None:
     """The mirror symmetry of a mesh (n,3), (m,3) whose polygons (m,) have symmetric targets, too; None without one."""
     n, owner, target = len(vertices), _given_polygons(triangles, polygons, faces), faces.area * faces.ratio
-    pairs = np.unique(np.repeat(owner[faces.owner], 3).astype(np.int64) * n + faces.triangles.ravel())
+    pairs = np.unique(np.concatenate([(n * owner[of][:, None] + cells).ravel() for cells, of in _cells(faces)]))
     asked = [np.bincount(owner, x) for x in ([target] if faces.region is None else [target, target * faces.region])]
     around = [np.bincount(pairs % n, values[pairs // n], n) for values in asked]
     # What is no longer needed takes as much memory as the search.
@@ -72,6 +72,13 @@ def find_symmetry(
         return None
     second = find_mirror(vertices, triangles, polygons, across=first, accepted=accepted)
     return mirror_symmetry(np.array([m.image for m in (first, second) if m is not None]))
+
+
+def _cells(faces: Elements) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Corners (k,3) of the triangles that are none of a quad's, and (q,4) of the quads, and the polygon of each."""
+    lone, quads, count = lone_triangles(faces), corners_of_quads(faces), len(faces.area)
+    yield faces.triangles[:lone], faces.owner[:lone]
+    yield quads, np.arange(count - len(quads), count)
 
 
 def _given_polygons(triangles: np.ndarray, polygons: np.ndarray | None, faces: Elements) -> np.ndarray:

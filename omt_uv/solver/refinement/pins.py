@@ -94,7 +94,9 @@ def placed_like(
     if area is None:
         area = abs(faces.areas(given).sum())
     w = w * np.sqrt(area / faces.areas(w).sum())
-    mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.triangle_areas, 3) / 3, len(w))
+    mass, third = np.zeros(len(w)), faces.triangle_areas / 3
+    for here in faces.some_at_once():
+        np.add.at(mass, faces.triangles[here].ravel(), np.repeat(third[here], 3))
     placed = fit_similarity(w, given, mass, rigid=True)(w)
     return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..maps.contacts import crossings_on_the_way, loop_edges
 from ..maps.energy import Elements, area_error, elements, energies, squared
 from ..mesh.geometry import KEPT_HATS
-from ..mesh.topology import order_of_numbers, runs
+from ..mesh.topology import halfedges, order_of_numbers, runs
 from ..progress import Progress, Steps
 
 # Least eigenvalue of a vertex's Hessian over the greatest.
@@ -150,12 +150,12 @@ def _stars(F: np.ndarray, n: int, whole=False):
 def _inner(F: np.ndarray, n: int) -> np.ndarray:
     """Which of n vertices (n,) bool are on no boundary of an oriented manifold mesh (m,3): their neighbours after them
     are those before them. Sums of random numbers tell that, in a third of the memory of twins."""
-    number = np.random.default_rng(0).integers(1 << 31, size=n)
-    balance = np.zeros(n)
-    for k in range(3):
-        tail, head = F[:, k], F[:, (k + 1) % 3]
-        balance += np.bincount(tail, number[head], n)
-        balance -= np.bincount(head, number[tail], n)
+    number = np.random.default_rng(0).integers(1 << 62, size=n)
+    balance = np.zeros(n, np.int64)
+    for begin in range(0, len(F), PART):
+        tail, head = halfedges(F[begin : begin + PART])
+        np.add.at(balance, tail, number[head])
+        np.subtract.at(balance, head, number[tail])
     return balance == 0
 
 
