@@ -153,6 +153,8 @@ def cut_along_shorter(surface: Surface) -> Surface:
     # Vertices of no quad are as good as any that no diagonal joins.
     others = np.where(number[triangles] < 0, len(used) + triangles, number[triangles])
     turned = longer_diagonals(points, given.reshape(-1, 4), others)
+    if not turned.any():
+        return surface
     corners, cut = surface.triangles.ravel()[places[turned]], surface.triangles.copy()
     cut[places[turned, 0] // 3], cut[places[turned, 1] // 3] = corners[:, [0, 1, 3]], corners[:, [1, 2, 3]]
     return replace(surface, triangles=cut)

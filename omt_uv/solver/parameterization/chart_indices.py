@@ -16,6 +16,9 @@ from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..refinement.pins import Pins, aligned_to_pins, check_pins
 
+# Triangles beyond which the numbers of a chart take half of the memory.
+MANY = 100_000
+
 
 def chart_target(target: Target | None, surface: Surface, chart: Chart) -> Target | None:
     """The part of a surface's target that the triangles of a chart have; None for none."""
@@ -48,13 +51,15 @@ def in_order_of_places(chart: Chart) -> tuple[Chart, np.ndarray]:
     polygon = np.unique(chart.faces, return_inverse=True)[1].ravel()
     rows = np.lexsort((*triangles.T[::-1], *_polygon_keys(triangles, polygon)))
     patches = lowest_first(place[chart.patches])[0]
+    # What is kept while a large chart is mapped takes half of the memory that it was found in.
+    kept = np.int32 if len(rows) > MANY else np.int64
     found = replace(
         chart,
         vertices=chart.vertices[order],
-        triangles=triangles[rows],
-        corners=corners[rows],
-        faces=chart.faces[rows],
-        vertex_ids=chart.vertex_ids[order],
+        triangles=triangles.astype(kept)[rows],
+        corners=corners.astype(kept)[rows],
+        faces=chart.faces.astype(kept)[rows],
+        vertex_ids=chart.vertex_ids.astype(kept)[order],
         patches=patches[np.lexsort(patches.T[::-1])],
     )
     return found, order

@@ -149,8 +149,7 @@ def map_chart(
             steps = _refined(replace(disk), start, again, given, log)
             disk, initial, given, start, vertices = _outlined(disk), replace(initial, uv=NOWHERE), {}, NOWHERE, NOWHERE
             refined = yield from part_of(steps, *REFINEMENT)
-        # Centres of polygons were there for the map alone.
-        refined = replace(refined, uv=refined.uv[: len(chart.vertices)])
+        refined = replace(refined, uv=refined.uv[: len(chart.vertices)])  # without the centres of polygons
     with log.timed("measure"):
         vertices, unit = in_unit_box(chart.vertices)
         figures = measured_chart(vertices, chart, refined.uv, density)

@@ -212,8 +212,7 @@ def coarse_initial_map(
         try:
             found = yield from _coarse_initial_map(disk, balance, log, None, draft=False, embedded=False)
         except MeshError:
-            # An embedding of all of it says what it is.
-            found = None
+            found = None  # an embedding of all of it says what it is
         if found is not None and map_energy(found.uv, disk.vertices, disk.triangles) < HOPELESS:
             return found
     return (yield from _coarse_initial_map(disk, balance, log, flat, draft, embedded=True))
@@ -261,18 +260,19 @@ def _coarse_initial_map(
             *COARSE_REFINEMENT,
         )
     log.warnings += refined.warnings
+    stages = found.conformal, found.cells, far, True, refined.multiplier
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
+        del coarse, coarse_disk, points, found, refined  # what leads back takes the memory of ten maps
         give_back_of(len(vertices))
         weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
         sweeps, enough = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
-        smooth = smoothed_uv(vertices, triangles, disk.target, uv, weight, sweeps, enough)
-        uv = yield from part_of(smooth, *SMOOTHING)
-        # Of slivers a coarser mesh says nothing: none of their vertices can go without others turning inside out.
+        uv = yield from part_of(smoothed_uv(vertices, triangles, disk.target, uv, weight, sweeps, enough), *SMOOTHING)
+        # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
         start = None if far or draft else flat
         if start is not None and map_energy(start, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(start)
-    return InitialChartMap(uv, found.conformal, found.cells, far, True, refined.multiplier)
+    return InitialChartMap(uv, *stages)
 
 
 def _even_start(disk: DiskMesh, flat: np.ndarray) -> np.ndarray | None:

@@ -166,16 +166,17 @@ def _round(V, F, flat, mass, rank):
     new = np.column_stack([into, after, before])[stays]
     normal = None if flat is not None else _sums(row, _normals(V, np.column_stack([v, after, before]))[0])
     corner, share = _places(V, flat, vertex, row[stays], new, ahead, normal)
-    removal = RemovalRound(
-        vertex=vertex,
-        into=new[np.searchsorted(row[stays], np.arange(len(vertex))), 0],
-        corner=corner,
-        share=share,
-        row=row,
-        after=after,
-        before=before,
-        mass=mass[star, 0],
-    )
+    numbers = {
+        "vertex": vertex,
+        "into": new[np.searchsorted(row[stays], np.arange(len(vertex))), 0],
+        "corner": corner,
+        "row": row,
+        "after": after,
+        "before": before,
+    }
+    # They wait for the way back, and take half of the memory that they were found in.
+    kept = {name: values.astype(np.int32) for name, values in numbers.items()}
+    removal = RemovalRound(share=share, mass=mass[star, 0], **kept)
     size = np.sqrt(_squared(_normals(V, new)[0]))
     part = size / np.maximum(np.bincount(row[stays], size, len(vertex)), 1e-300)[row[stays]]
     others = np.ones(len(F), bool)
