@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.geometry import as_points, cross2
-from ..mesh.topology import expand
+from ..mesh.topology import expand, order_of_numbers
 from .contacts import lies_apart
 
 SAMPLES = 200_000  # points by default: a standard error of 0.1 % of the area
 CHUNK = 2_000_000  # pairs of a sample and a face tested at once, for memory
 MOST_PAIRS = 100_000_000  # a map that lies many times over itself is judged by fewer samples, for time
 ENTRIES_PER_FACE = 40  # the grid is coarsened until its lists are no longer than this on average
+MOST_ENTRIES = 12_000_000  # or than this in all, where there are not many more faces, for memory
+AT_ONCE = 50_000  # faces whose cells are found at once
 INSIDE = 1e-9  # a point this close to a face's border, relative to the squared extent, is not inside
 PAIR_WORK = 12  # comparisons of a point and a face that take as long as one of two faces, and half of them again
 
@@ -81,17 +83,27 @@ class _Grid:
         self.origin = low.min(0)
         self.extent = (high.max(0) - self.origin).max()
         self.side = int(np.clip(np.sqrt(len(tri)), 8, 1024))
+        most = min(ENTRIES_PER_FACE * len(tri), max(MOST_ENTRIES, 8 * len(tri)))
         first, span = self._boxes(low, high)
-        while self.side > 1 and span.prod(1).sum() > ENTRIES_PER_FACE * len(tri):
+        while self.side > 1 and span.prod(1).sum() > most:
             self.side //= 2
             first, span = self._boxes(low, high)
-        owner, k = expand(span.prod(1))
-        column = first[owner, 0] + k % span[owner, 0]
-        row = first[owner, 1] + k // span[owner, 0]
-        cell = column * self.side + row
-        order = np.argsort(cell, kind="stable")
-        self.owner = owner[order]
-        self.start = np.searchsorted(cell[order], np.arange(self.side**2 + 1))
+        cell, owner = self._entries(first, span)
+        self.start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=self.side**2))])
+        self.owner = owner[order_of_numbers(cell)]
+
+    def _entries(self, first, span):
+        """The cells and the triangles of all entries (e,), triangle by triangle: cells of boxes (m,2), (m,2)."""
+        size = span.prod(1)
+        end = np.cumsum(size)
+        cell, owner = (np.empty(size.sum(), np.int32) for _ in range(2))
+        for begin in range(0, len(size), AT_ONCE):
+            here = slice(begin, begin + AT_ONCE)
+            own, k = expand(size[here])
+            some = slice(end[begin] - size[begin], end[begin] - size[begin] + len(own))
+            column, row = first[here][own, 0] + k % span[here][own, 0], first[here][own, 1] + k // span[here][own, 0]
+            cell[some], owner[some] = column * self.side + row, begin + own
+        return cell, owner
 
     def _boxes(self, low, high):
         """First cell (m,2) of every bounding box, and how many columns and rows it touches (m,2)."""
@@ -121,7 +133,7 @@ class _Grid:
         inside = np.diff(self.start)
         entry, k = expand(np.repeat(inside, inside))
         one, other = self.owner[entry], self.owner[np.repeat(self.start[:-1], inside)[entry] + k]
-        pairs = np.unique(one * len(self.tri) + other)
+        pairs = np.unique(one.astype(np.int64) * len(self.tri) + other)
         one, other = np.divmod(pairs, len(self.tri))
         a, b = self.tri[one][:, :, None], self.sides[one][:, :, None]
         reach = cross2(b, self.tri[other][:, None] - a).max(axis=2).min(axis=1)
