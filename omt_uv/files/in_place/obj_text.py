@@ -12,6 +12,8 @@ from .imported import InPlaceError
 
 WORD = re.compile(rb"[^\s\\#]+")
 CONTINUED = re.compile(rb"\\\r?\n")
+# Lines of faces whose words are taken at once.
+AT_ONCE = 50_000
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,14 @@ def _float(word: bytes) -> float:
 
 def _corners(lines: list[bytes], faces: list) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """face_start (f+1,), vertices (c,) and UVs (c,) of face lines; -1 for what is not there."""
+    # Some after the others: the words of all lines take several times the memory of their text.
+    parts = [_some_corners(lines, faces[k : k + AT_ONCE]) for k in range(0, max(len(faces), 1), AT_ONCE)]
+    sizes, vertex, uv = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return np.append(0, np.cumsum(sizes)), vertex, uv
+
+
+def _some_corners(lines: list[bytes], faces: list) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How many corners face lines (f,) have, and their vertices (c,) and UVs (c,)."""
     of = [words(lines[i])[1:] for i, *_ in faces]
     sizes = np.array([len(row) for row in of], np.int64)
     said = _indices([word for row in of for word in row])
@@ -137,7 +147,7 @@ def _corners(lines: list[bytes], faces: list) -> tuple[np.ndarray, np.ndarray, n
     there = np.repeat(before, sizes, axis=0)
     index = np.where(said > 0, said - 1, np.where(said < 0, said + there, -1))
     index[(index < 0) | (index >= there)] = -1
-    return np.append(0, np.cumsum(sizes)), index[:, 0], index[:, 1]
+    return sizes, index[:, 0], index[:, 1]
 
 
 def _indices(corners: list[bytes]) -> np.ndarray:

@@ -279,10 +279,10 @@ def _shear_of_polygons(mesh: _Triangles, polygons, mirrored) -> tuple[np.ndarray
     has *= np.where(mirrored[of], -1, 1)
     of = polygons[of]
     # A triangle that is about to turn over says no more of its quad than one that has.
-    total = max(float(np.abs(has).sum()), float(np.finfo(float).tiny))
+    covered = max(float(np.abs(has).sum()), float(np.finfo(float).tiny))
     forward = np.empty(len(area), bool)
     for here, least in ((slice(given), 0), (slice(given, None), VANISHED)):
-        forward[here] = has[here] > least * area[here] * total / area.sum()
+        forward[here] = has[here] > least * area[here] * covered / area.sum()
     del has
     turned = np.bincount(of, forward, count) == 0
     area[~(forward | turned[of])] = 0

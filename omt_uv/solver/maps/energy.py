@@ -50,7 +50,8 @@ class Quads:
 
     def of(self, some) -> Quads:
         """Some of the quads, a slice or (q,) bool."""
-        return Quads(*(None if x is None else x[some] for x in (self.size, self.convex, self.crossed, self.both)))
+        crossed, both = (None if x is None else x[some] for x in (self.crossed, self.both))
+        return Quads(self.size[some], self.convex[some], crossed, both)
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,9 @@ class Elements:
     """Polygons of a surface, and the triangles on which their shear is measured, ready for the energy.
 
     triangles (m,3); hats (m,3), the gradients of the hat functions in each triangle's own plane, complex, or, of many,
-    what makes them. Of every polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface area; weight (p,) in the
-    energy, summing to 1; region (p,) in [0, 1], weights of a region whose share shall be exact, if there is one.
+    what makes them. Of every polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface
+    area; weight (p,) in the energy, summing to 1; region (p,) in [0, 1], weights of a region whose share shall be
+    exact, if there is one.
     polygon (m,): whose triangle each is, None where each is a polygon of its own; lone (k,): how much of its polygon's
     area each stands for that is none of a quad's; quads: those of the last triangles, four each.
     """

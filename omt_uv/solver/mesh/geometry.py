@@ -300,19 +300,20 @@ class Sides:
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray):
         self._mesh = positions, triangles
+        self._sides: np.ndarray | None
         self.area, self._sides = self._found()
 
     def gradient(self, here: slice | np.ndarray) -> np.ndarray:
         """The gradients (k,3) complex of some triangles."""
-        if self._sides is None:
-            _, self._sides = self._found()
-        return gradients_of(self._sides[here])
+        sides = self._found()[1] if self._sides is None else self._sides
+        self._sides = sides
+        return gradients_of(sides[here])
 
     def let_go(self) -> None:
         """Hold nothing until it is asked for."""
         self._sides = None
 
-    def _found(self) -> tuple[np.ndarray, np.ndarray | None]:
+    def _found(self) -> tuple[np.ndarray, np.ndarray]:
         """Areas (m,), and the sides (m,3)."""
         positions, triangles = self._mesh
         area, sides = np.empty(len(triangles)), np.empty((len(triangles), 3))

@@ -144,10 +144,9 @@ def map_chart(
         start, places = mirrored_to_pins(initial.uv, pins)
         refined = good_enough(disk, start, draft, initial.apart, goal) if plain else None
         if refined is None:
-            given = {"target": None if target is None else disk.target, "pins": places}
             again = _refinement_options(disk, options, initial, places is None)
-            steps = _refined(replace(disk), start, again, given, log)
-            disk, initial, given, start, vertices = _outlined(disk), replace(initial, uv=NOWHERE), {}, NOWHERE, NOWHERE
+            steps = _refined(replace(disk), start, again, target is not None, places, log)
+            disk, initial, start, vertices = _outlined(disk), replace(initial, uv=NOWHERE), NOWHERE, NOWHERE
             refined = yield from part_of(steps, *REFINEMENT)
         refined = replace(refined, uv=refined.uv[: len(chart.vertices)])  # without the centres of polygons
     with log.timed("measure"):
@@ -378,13 +377,12 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
     return (yield from direct_initial_map(disk, log))
 
 
-def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: dict, log: RunLog) -> Steps[Refinement]:
-    """The refined map, with a free boundary where the domain asked for leaves faces folded.
-
-    given : target and pins of `refine`
-    """
-    domain = options.boundary
-    given = given | {"region": disk.region, "polygons": disk.polygons}
+def _refined(
+    disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, has_target: bool, pins, log: RunLog
+) -> Steps[Refinement]:
+    """The refined map, with a free boundary where the domain asked for leaves faces folded; pins : see `refine`."""
+    domain, given = options.boundary, {"region": disk.region, "polygons": disk.polygons, "pins": pins}
+    given["target"] = disk.target if has_target else None
     try:
         steps = refine(disk.vertices, disk.triangles, uv, options, **given)
         if domain == "free":

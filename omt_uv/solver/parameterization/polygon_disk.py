@@ -50,12 +50,12 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     centres, fans, of_fans = polygon_fans(vertices, cut.triangles, own)
     kept = ~np.isin(own, of_fans)
     halves = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
-    numbers = [own[kept], np.repeat(of_quads, 2), of_fans, -1 - np.arange(len(chart.patches))]
-    triangles = [cut.triangles[kept], halves, fans, chart.patches]
+    polygons = [own[kept], np.repeat(of_quads, 2), of_fans, -1 - np.arange(len(chart.patches))]
+    corners = [cut.triangles[kept], halves, fans, chart.patches]
     return PolygonDisk(
         vertices=np.concatenate([vertices, centres]) if len(centres) else vertices,
-        triangles=np.concatenate([x.astype(chart.triangles.dtype, copy=False) for x in triangles]),
-        polygons=np.concatenate([x.astype(chart.faces.dtype, copy=False) for x in numbers]),
+        triangles=np.concatenate(corners, dtype=chart.triangles.dtype, casting="same_kind"),
+        polygons=np.concatenate(polygons, dtype=chart.faces.dtype, casting="same_kind"),
     )
 
 

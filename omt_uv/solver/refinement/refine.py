@@ -175,10 +175,9 @@ def refine(
     give_back_of(len(vertices))
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins, polygons, options.order)
-    asked = _Asked(target, region, polygons)
+    steps, mesh = _refined(mesh, _AreasAsked(target, region, polygons), options), mesh.bare()
     # Whoever called may have let go of it.
     del vertices, triangles, uv, target, region, polygons
-    steps, mesh = _refined(mesh, asked, options), mesh.bare()
     try:
         found, faces, warnings = yield from steps
     except MeshError as error:
@@ -213,9 +212,9 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-@dataclass
-class _Asked:
-    """What is asked of the triangles of a mesh, see `refine`, as long as elements are made of it."""
+@dataclass(frozen=True)
+class _AreasAsked:
+    """What is asked of the triangles of a mesh, see `refine`."""
 
     target: np.ndarray
     region: np.ndarray | None
@@ -228,12 +227,9 @@ class _Asked:
         """The elements of which each triangle is a polygon of its own."""
         return faces if faces.polygon is None else elements(mesh.vertices, mesh.triangles, self.target, self.region)
 
-    def let_go(self) -> None:
-        self.target, self.region, self.polygons = np.zeros(0), None, None
-
 
 def _refined(
-    mesh: Renumbered, asked: _Asked, options: RefinementOptions
+    mesh: Renumbered, asked: _AreasAsked, options: RefinementOptions
 ) -> Steps[tuple[ContinuationResult, Elements, tuple[str, ...]]]:
     """Stages on a renumbered chart: what was found, the elements, and the warnings of the initial map it was found
     from."""
@@ -272,14 +268,12 @@ def _refined(
     # All of them take the memory of four maps, and are made in less time than a step takes.
     del by_triangle, faces
     if symmetry is None:
-        asked.let_go()
+        asked, mesh = _AreasAsked(np.zeros(0), None, None), mesh if boundary == "disk" else mesh.bare()
         if parts is not None:
             parts.hold(half.triangles)
-        mesh = mesh if boundary == "disk" else mesh.bare()
     ahead = options.prolonged and boundary == "free"
     way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier, ahead)
-    w = w if boundary == "disk" else w[:0].copy()
-    found = yield from part_of(way, *STAGES)
+    w, found = w if boundary == "disk" else w[:0].copy(), (yield from part_of(way, *STAGES))
     faces = half if symmetry is None else asked.elements(mesh)
     error = area_error(faces, found.w)
     if notches and error > max(NO_ROOM, 2 * quality.area_error):

@@ -225,8 +225,7 @@ def relax(
     first = np.unique(np.concatenate([row[parts], [len(vertex)]]))
     begin = np.searchsorted(row, first)
     for a, b, c, d in zip(first[:-1], first[1:], begin[:-1], begin[1:], strict=True):
-        whole = isinstance(faces, Elements) and d - c == len(row)
-        some = faces if whole else _rows(faces, slice(c, d))
+        some = faces if isinstance(faces, Elements) and d - c == len(row) else _rows(faces, slice(c, d))
         stay = np.broadcast_to(fixed, len(vertex))[a:b]
         _relax(vertex[a:b], row[c:d] - a, some, w, area_weight, steps, stay)
 

@@ -523,7 +523,7 @@ def test_what_a_domain_has_no_room_for_is_mapped_freely(boundary, error, squeeze
         vertices=V, triangles=F, target=np.full(8, 1 / 8), loop=np.arange(3), region=None, polygons=None
     )
     log = RunLog()
-    steps = chart_maps._refined(disk, V[:, :2], options, {}, log)
+    steps = chart_maps._refined(disk, V[:, :2], options, False, None, log)
     if boundary == "free" and error is not None:
         with pytest.raises(error) as caught:
             drain(steps)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.errors import FoldedUVError
-from omt_uv.solver.maps import energy
 from omt_uv.solver.maps.energy import Elements, elements, energies
 from omt_uv.solver.maps.mirror_symmetry import mirror_symmetry
 from omt_uv.solver.maps.polygon_elements import polygon_elements
