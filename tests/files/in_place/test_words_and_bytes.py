@@ -574,3 +574,15 @@ def test_views_begin_where_they_say_and_at_the_start_where_they_do_not(offset):
     doc = {"bufferViews": [view, {"byteLength": 2}], "accessors": [{"bufferView": 1}, {"bufferView": 0}]}
     held = gltf._contents(SimpleNamespace(doc=doc, binary=data))
     assert held == [(data[:2], None), (data[begin : begin + 3], 12)]
+
+
+def test_words_of_faces_are_taken_some_after_the_others(monkeypatch):
+    """Indices that count backwards do so from where their line stands."""
+    data = (
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nvt 0 0\nvt 1 1\nf -3/-1 2/1 3\nv 1 1 0\nf 1//1 2 -1 3\nl 1 2\nf 9 1 2\n"
+    )
+    found = vars(obj_text.read(data))
+    monkeypatch.setattr(obj_text, "AT_ONCE", 2)
+    for name, values in vars(obj_text.read(data)).items():
+        np.testing.assert_array_equal(values, found[name])
+    assert found["corner_vertex"].tolist() == [0, 1, 2, 0, 1, 2, 0, 1, 3, 2, 0, 1, -1, 0, 1]

@@ -205,3 +205,25 @@ def test_elements_of_triangles_need_no_quads():
     w = V[:, 0] + 1j * V[:, 1]
     found = assembly.hessian(faces, w, 30.0, 1.0, (np.ones(len(w), complex), np.ones((len(w), 2))))
     assert found.rest is None and found.matrix(np.ones(2 * len(w)), None).plain().shape == (2 * len(w),) * 2
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_motions_of_both_axes_are_kept_once_where_all_vertices_are_free(held):
+    """What they make of unknowns, and the other way round, is the same to the bit."""
+    rng, n, parts = np.random.default_rng(0), 300, 7
+    w, along = rng.normal(size=(n, 2)) @ [1, 1j], np.tile([1, 1j], (n, 1))
+    along[:9] *= not held
+    spread = schwarz.affine_motions(rng.permutation(np.arange(n) % parts), parts, w, along)
+    motions = sweeps.Motions(spread, not held)
+    x, r = rng.normal(size=6 * parts), rng.normal(size=2 * n)
+    np.testing.assert_array_equal(motions.of(x), spread @ x)
+    np.testing.assert_array_equal(motions.gathered(r), spread.T @ r)
+
+
+def test_parts_are_made_of_triangles_that_are_held_anyway(monkeypatch):
+    whole, swept, w = flattened("free")
+    monkeypatch.setattr(sweeps, "MOST", 2)
+    swept.assembly.parts.hold(whole.faces.triangles[::-1].copy())
+    _, most = newton_direction(whole, w)
+    _, slope = newton_direction(swept, w)
+    assert slope < 0.9 * most

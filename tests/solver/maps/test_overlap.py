@@ -79,3 +79,15 @@ def test_samples_are_looked_at_in_parts_of_any_size(chunk, monkeypatch):
     assert overlap.overlap_share(uv, samples=500) == share > 0
     for one, other in zip(overlap.cover_pairs(uv, points), pairs, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_coarser_grid_finds_the_same(monkeypatch):
+    """Long triangles lie in many cells, and lists of these would fill the memory."""
+    rng = np.random.default_rng(0)
+    uv = rng.random((400, 1, 2)) + rng.normal(size=(400, 3, 2)) * [1.0, 0.01]
+    found = overlap_share(uv)
+    monkeypatch.setattr(overlap, "MOST_ENTRIES", 1)
+    monkeypatch.setattr(overlap, "AT_ONCE", 7)
+    grid = overlap._Grid(uv)
+    assert len(grid.owner) <= 8 * len(uv) and grid.side < overlap._Grid(uv[:1]).side * 20
+    assert overlap_share(uv) == found > 0.1

@@ -9,6 +9,7 @@ import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization import convexity, polygon_corners
 from omt_uv.solver.parameterization.convexity import keep_convex
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped
@@ -182,3 +183,15 @@ def test_no_fan_of_suzanne_folds():
     result = drain(unwrap(surface))
     assert (corner_areas(surface, result, straight=True) > 0).all()
     assert max(m.area_l1 for m in result.maps) <= 0.01 and sum(m.folds for m in result.maps) == 0
+
+
+@pytest.mark.parametrize("at_once", [5, 1000])
+def test_where_all_corners_are_open_none_is_looked_for(at_once, monkeypatch):
+    """Maps are told to have none whichever way it is found, some polygons after the others or all at once."""
+    monkeypatch.setattr(polygon_corners, "POLYGONS", at_once)
+    surface, chart, uv = darts()
+    given = surface, [chart], chart.triangles
+    for flat, opened in ((uv, False), (chart.vertices[:, :2], True), (-chart.vertices[:, :2], True)):
+        w = flat @ [1, 1j]
+        corners = convexity._mapped_corners(*given, w)
+        assert convexity._all_open(*given, w) == opened == (not corners.reflex(w).any())

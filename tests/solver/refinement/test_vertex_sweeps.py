@@ -7,8 +7,9 @@ import pytest
 from omt_uv.solver.maps.contacts import crossings
 from omt_uv.solver.maps.energy import area_error, elements, energies, energy
 from omt_uv.solver.maps.tutte import arc_length_parameters, tutte
+from omt_uv.solver.mesh import geometry
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.mesh.topology import boundary_loops, halfedges, twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import vertex_sweeps as smoothing
 
@@ -115,3 +116,30 @@ def test_a_step_is_newtons(chart):
     expected = -np.linalg.solve(hessian, gradient[..., None])[..., 0] @ [1, 1j]
     found = smoothing._directions(row, smoothing._around(star, w), WEIGHT, len(vertex))
     np.testing.assert_allclose(found[convex], expected[convex], atol=1e-3 * np.abs(expected).max())
+
+
+def test_of_many_triangles_stars_and_gradients_are_taken_as_they_are_asked_for(chart, monkeypatch):
+    """The maps are the same to the bit."""
+    faces, w, loop = chart
+    V, F = meshes.head(16)
+    density = np.random.default_rng(0).uniform(0.5, 2, len(F))
+    expected = [drain(smoothing.smoothed(faces, w, WEIGHT, 3, edge)) for edge in (None, loop)]
+    monkeypatch.setattr(geometry, "KEPT_HATS", 100)
+    monkeypatch.setattr(smoothing, "KEPT_HATS", 100)
+    many = elements(V, F, face_areas(V, F) * density)
+    np.testing.assert_array_equal(many.gradient, faces.gradient)
+    many.let_go()
+    some = np.array([3, 77, 8])
+    np.testing.assert_array_equal(many.gradient_at(some), faces.gradient[some])
+    for smooth, edge in zip(expected, (None, loop), strict=True):
+        np.testing.assert_array_equal(drain(smoothing.smoothed(many, w, WEIGHT, 3, edge)), smooth)
+
+
+@pytest.mark.parametrize("holes", [0, 5])
+def test_inner_vertices_are_those_between_twins(holes):
+    V, F = meshes.head(12)
+    F = np.delete(F, np.random.default_rng(0).permutation(len(F))[:holes], axis=0)
+    tail, head = halfedges(F)
+    expected = np.ones(len(V), bool)
+    expected[tail[twins(F) < 0]] = expected[head[twins(F) < 0]] = False
+    np.testing.assert_array_equal(smoothing._inner(F, len(V)), expected)
