@@ -303,4 +303,5 @@ def test_sweeps_follow_steps_of_large_meshes_with_a_region(change, n):
 def test_elements_triangle_by_triangle_are_those_of_no_polygons():
     mesh = SimpleNamespace(vertices=V, triangles=F)
     plain = elements(V, F, face_areas(V, F))
-    assert refinement._by_triangle(mesh, plain, None, None) is plain
+    asked = refinement._AreasAsked(face_areas(V, F), None, None)
+    assert asked.by_triangle(mesh, plain) is plain
