@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import meshes
 import numpy as np
 
 from benchmarks.seams import cut_seams
-from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.surface import Surface, triangle_surface
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -36,6 +36,13 @@ def load_case(name: str) -> Case:
     V, F = meshes.load_model(name) if meshes.model_path(name) else getattr(meshes, name)()
     seams = cut_seams(V, F)
     return Case(name + "*" * bool(len(seams)), V, F, seams)
+
+
+def polygon_model(name: str) -> Surface:
+    """A published model with its polygons, its positions in single precision as Blender holds them: where a search of
+    seams ends can hang on their last digits."""
+    surface = meshes.polygon_surface(*meshes.load_polygons(name))
+    return replace(surface, positions=surface.positions.astype(np.float32).astype(float))
 
 
 def available(names=None) -> list[str]:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import meshes
 import numpy as np
 
+from benchmarks.cases import polygon_model
 from benchmarks.part import MODELS, Part
 from benchmarks.tables import Table, missed
 from benchmarks.timing import timed
@@ -45,7 +46,7 @@ def clicks_table(args) -> Table:
     """One row for every model."""
     table = Table("One click", COLUMNS)
     for name in args.models or [m for m in DEFAULT_MODELS if meshes.model_path(m)]:
-        surface = meshes.polygon_surface(*meshes.load_polygons(name))
+        surface = polygon_model(name)
         layout, seconds = one_click(surface)
         uv = np.zeros((len(surface.corner_vertex), 2))
         uv[layout.corners[0]] = layout.uv[0]

@@ -15,6 +15,7 @@ from typing import Any
 import meshes
 import numpy as np
 
+from benchmarks.cases import polygon_model
 from benchmarks.part import MODELS, Option, Part
 from benchmarks.tables import Table, missed
 from benchmarks.timing import timed
@@ -81,7 +82,7 @@ def level_table(args) -> Table:
     for taste in tastes:
         ratios = []
         for name in args.models or [m for m in RIVAL if meshes.model_path(m)]:
-            its, surface = RIVAL[name], meshes.polygon_surface(*meshes.load_polygons(name))
+            its, surface = RIVAL[name], polygon_model(name)
             energy = its.exact if args.balance == 0 else ITS_ENERGY
             tried = list(trials(surface, energy, args.balance, taste))
             seam, near = length_at(tried, energy), min(tried, key=lambda t: abs(t.energy - energy))

@@ -125,10 +125,14 @@ def within(chart: Chart) -> np.ndarray:
     return keys[count > 1]
 
 
+def all_within(charts: list[Chart]) -> np.ndarray:
+    """Keys (e,) of the edges within any of the charts, see `within`."""
+    return np.concatenate([np.zeros(0, np.int64), *(within(chart) for chart in charts)])
+
+
 def but_within(edges: np.ndarray, charts: list[Chart]) -> np.ndarray:
     """Those of the edges (e,2) that are not within charts, which are cut anew."""
-    inner = np.concatenate([np.zeros(0, np.int64), *(within(chart) for chart in charts)])
-    return edges[~np.isin(pair_keys(*edges.T), inner)]
+    return edges[~np.isin(pair_keys(*edges.T), all_within(charts))]
 
 
 def is_marked(surface: Surface, chart: Chart) -> bool:

@@ -16,7 +16,7 @@ from ..mesh.geometry import face_areas
 from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import COMPACT, SPREAD_BY_SHEAR
-from .chart_indices import but_within, edge_set, identity, is_marked, outline
+from .chart_indices import all_within, but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear, measured_map
 from .convex_maps import with_figures
 from .mirrored_charts import mapped_anew
@@ -83,16 +83,21 @@ def bound_shear(
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
     crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None = None,
     map_sparing: Callable[[list[Chart]], Steps[list[ChartMap]]] | None = None,
+    of_pieces: bool = False,
 ) -> Steps[BoundedShear]:
     """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or the worst stays.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
     crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
-    map_sparing : a solver that shears less, for areas which are no more exact than is promised.
+    map_sparing : a solver that shears less, for areas which are no more exact than is promised; of_pieces : charts came
+    off a whole whose seams were searched: those that miss the bound keep what was cut of them, and are cut further.
     Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
     """
     early, free = EarlyEnd(), crossing is not None
     best = last = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
+    if of_pieces:
+        # A search of one by itself would begin anew, and predicts it no better than the whole.
+        best = last = replace(last, settled=all_within([last.charts[k] for k in last.searched]))
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried, worse = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]]()
     rehearsed, crossed = dict[str, Any](), False
@@ -189,7 +194,7 @@ class _Asked:
         """What is asked of charts of a round that missed the bound, and of what is left of those that come apart around
         flat sides; worth a map is what was not tried."""
         chosen = [*missed, *flat]
-        kept = [but_within(last.cuts.edges, [last.charts[k] for k in chosen]), *apart.values()]
+        kept = [but_within(last.kept(missed), [last.charts[k] for k in flat]), *apart.values()]
         return _Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
 
 
@@ -208,7 +213,7 @@ def _cut_anew(search: ShearSearch, last: Round, asked: _Asked, map_charts, early
     mapped = yield from unless_ended(part_of(mapping, SEARCHING, 1 - SEARCHING), early)
     if mapped is None:
         return None
-    return Round.of(search, again.charts, mapped, joined(search, last.cuts, edges), memory)
+    return Round.of(search, again.charts, mapped, joined(search, last.cuts, edges), memory, last.settled)
 
 
 def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, early: EarlyEnd) -> Steps[Round]:
@@ -229,7 +234,7 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
         return last
     spared = dict(zip(last.searched, mapped, strict=True))
     maps = [spared.get(k, one) for k, one in enumerate(last.maps)]
-    new = Round.of(search, last.charts, maps, last.cuts, last.memory)
+    new = Round.of(search, last.charts, maps, last.cuts, last.memory, last.settled)
     return new if new.excess < last.excess else last
 
 
@@ -239,7 +244,7 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
     longer = [k for k in range(len(last.charts)) if last.has_slack(k)]
     if not longer:
         return last
-    kept = but_within(last.cuts.edges, [last.charts[k] for k in longer])
+    kept = last.kept(longer)
 
     def is_worth(edges: np.ndarray) -> bool:
         return joined(search, last.cuts, edges).length <= (1 - WORTHWHILE) * last.cuts.length

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import Steps, part_of
-from .chart_indices import identity, is_marked, outline
+from .chart_indices import all_within, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
@@ -184,7 +184,8 @@ class ShearSearch:
 @dataclass(frozen=True)
 class Round:
     """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the same
-    but above the bound where too much is steep (k,), and the numbers of those that miss it and may be cut for that."""
+    but above the bound where too much is steep (k,), the numbers of those that miss it and may be cut for that, and the
+    keys (s,) of edges that stay cut when these are cut anew."""
 
     charts: list[Chart]
     maps: list[ChartMap]
@@ -195,9 +196,17 @@ class Round:
     pressing: np.ndarray
     bound: float
     searched: list[int]
+    settled: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @staticmethod
-    def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts, memory: dict) -> Round:
+    def of(
+        search: ShearSearch,
+        charts: list[Chart],
+        maps: list[ChartMap],
+        cuts: Cuts,
+        memory: dict,
+        settled: np.ndarray | None = None,
+    ) -> Round:
         shear = [local_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
         mean = np.array([area @ local / area.sum() for local, area in shear])
         area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
@@ -209,7 +218,13 @@ class Round:
         # What has no map at all is cut further without being asked: otherwise there would be nothing to look at.
         asked = [search.shear.further or one.failure is not None for one in maps]
         searched = [int(k) for k in missed if asked[k] or not is_marked(search.surface, charts[k])]
-        return Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
+        settled = np.zeros(0, np.int64) if settled is None else settled
+        return Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched, settled)
+
+    def kept(self, chosen: list[int]) -> np.ndarray:
+        """The edges (e,2) that stay cut when charts of these numbers are cut anew."""
+        keys, inner = pair_keys(*self.cuts.edges.T), all_within([self.charts[k] for k in chosen])
+        return self.cuts.edges[~np.isin(keys, inner) | np.isin(keys, self.settled)]
 
     @property
     def excess(self) -> float:
@@ -251,7 +266,7 @@ class Round:
         region = self._region(search)
         memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
         memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
-        return Round.of(search, charts, maps, joined(search, self.cuts, edges), memory)
+        return Round.of(search, charts, maps, joined(search, self.cuts, edges), memory, self.settled)
 
     @property
     def has_room(self) -> np.ndarray:

@@ -157,7 +157,7 @@ def unwrap(
         apart, parts = yield from part_of(pieces, 1 - PIECES, PIECES / 2)
         if len(parts) > len(maps) and not settled and is_worth_bounding(cut.search, apart, parts):
             # Limbs can shear more than the mean of them and all else.
-            further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing)
+            further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing, of_pieces=True)
             found = yield from part_of(further, 1 - PIECES / 2, PIECES / 2)
             apart, parts, missed = found.prepared, found.maps, found.warnings
         prepared, maps = apart, parts

@@ -263,7 +263,7 @@ def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
 
     made = []
 
-    def of(search, charts, maps, cuts, memory):
+    def of(search, charts, maps, cuts, memory, settled):
         made.append(maps)
         return round_of([1, 1], [1.0, after])
 

@@ -7,6 +7,7 @@ import hard_meshes
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, FoldedUVError
@@ -14,10 +15,10 @@ from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths, face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
 from omt_uv.solver.parameterization import shear_bound, shear_search
 from omt_uv.solver.parameterization import unwrap as unwrap_module
-from omt_uv.solver.parameterization.chart_indices import identity
+from omt_uv.solver.parameterization.chart_indices import identity, within
 from omt_uv.solver.parameterization.chart_map import local_shear, map_chart
 from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -386,6 +387,37 @@ def test_parts_of_what_came_apart_have_cuts_of_their_own_where_these_are_shorter
     assert {frozenset(e) for e in seam.tolist()} <= {frozenset(e) for e in after.cuts.edges.tolist()}
     # Parts whose own cuts are no shorter, and what is in one piece, stay as they are.
     assert drain(shear_bound._parts_cut_anew(search, after, map_charts, shear_bound.EarlyEnd())) is after
+
+
+def test_what_is_settled_stays_cut_when_its_chart_is_cut_anew():
+    n = 24
+    _, search, seam = halves(n, 1.3)
+    slits = [edges_along(row * (n + 1) + np.arange(n // 2 + 6)) for row in (4, n - 4)]
+    before = made_round(search, np.concatenate([seam, *slits]), [1.5, 1.2], [])
+    inner, between = [within(chart) for chart in before.charts], pair_keys(*seam.T)
+    assert len(inner) == 2 and len(inner[0]) and len(inner[1]) and not len(before.settled)
+
+    def kept(one, *chosen):
+        return sorted(pair_keys(*one.kept(list(chosen)).T))
+
+    assert kept(before, 0, 1) == sorted(between) and kept(before, 0) == sorted([*between, *inner[1]])
+    settled = replace(before, settled=inner[0])
+    assert kept(settled, 0, 1) == kept(settled, 1) == sorted([*between, *inner[0]])
+    assert kept(settled) == kept(settled, 0) == sorted([*between, *inner[0], *inner[1]])
+
+
+@pytest.mark.parametrize("of_pieces", [False, True])
+def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, monkeypatch):
+    n, seen = 24, []
+    _, search, seam = halves(n, 1.3)
+    slits = [edges_along(row * (n + 1) + np.arange(n // 2 + 6)) for row in (4, n - 4)]
+    before = made_round(search, np.concatenate([seam, *slits]), [1.5, 1.2], [])
+    assert before.searched == [0]
+    monkeypatch.setattr(shear_bound, "_first_round", lambda *_: worked(before))
+    monkeypatch.setattr(shear_bound, "_apart", lambda _, last, *__: worked(seen.append(last.settled)))
+    monkeypatch.setattr(shear_bound, "_made_shorter", lambda _, best, *__: worked(best))
+    drain(shear_bound.bound_shear(search, SimpleNamespace(warnings=()), [], None, of_pieces=of_pieces))
+    assert sorted(seen[0]) == (sorted(within(before.charts[0])) if of_pieces else [])
 
 
 @pytest.mark.parametrize("shears, worth", [((1.1, 1.3), True), ((1.1, 1.32), False), ((1.1, 1.36), True), ((), True)])

@@ -96,8 +96,14 @@ def whole(monkeypatch):
             )
 
         bounds = iter(["first", "apart"])
+
+        def bounding(*_, of_pieces=False):
+            first = next(bounds)
+            assert of_pieces == (first == "apart")
+            return step("bound", lambda *_: bound(first))()
+
         monkeypatch.setattr(unwrapping, "cut_charts", step("cut", made))
-        monkeypatch.setattr(unwrapping, "bound_shear", lambda *words: step("bound", lambda *_: bound(next(bounds)))())
+        monkeypatch.setattr(unwrapping, "bound_shear", bounding)
         monkeypatch.setattr(unwrapping, "in_pieces", step("pieces", (made.prepared, maps * parts)))
         monkeypatch.setattr(unwrapping, "is_worth_bounding", lambda *_: worth)
         monkeypatch.setattr(unwrapping, "cut_for_a_map", lambda *_: ["further"])

@@ -135,9 +135,9 @@ def test_limbs_that_come_off_keep_the_bound_by_themselves(monkeypatch):
     monkeypatch.setattr("omt_uv.solver.parameterization.shear_bound.COMPACT", 0.1)
     seen, bound_shear = [], unwrap_module.bound_shear
 
-    def recorded(search, first, maps, *rest):
+    def recorded(search, first, maps, *rest, **named):
         seen.append((len(first.charts), len(first.found_cuts.edges)))
-        found = yield from bound_shear(search, first, maps, *rest)
+        found = yield from bound_shear(search, first, maps, *rest, **named)
         return replace(found, warnings=(f"of {len(first.charts)}",))
 
     monkeypatch.setattr(unwrap_module, "bound_shear", recorded)
