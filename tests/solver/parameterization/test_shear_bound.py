@@ -411,7 +411,7 @@ def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, monkeyp
     n, seen = 24, []
     _, search, seam = halves(n, 1.3)
     slits = [edges_along(row * (n + 1) + np.arange(n // 2 + 6)) for row in (4, n - 4)]
-    before = made_round(search, np.concatenate([seam, *slits]), [1.5, 1.2], [])
+    before = made_round(search, np.concatenate([seam, *slits]), [2.0, 1.0], [])
     assert before.searched == [0]
     monkeypatch.setattr(shear_bound, "_first_round", lambda *_: worked(before))
     monkeypatch.setattr(shear_bound, "_apart", lambda _, last, *__: worked(seen.append(last.settled)))
