@@ -53,6 +53,10 @@ class SeamFinder(Protocol):
     def is_again(self) -> bool:
         """Whether this is no first search: what was cut before, nets too, has missed its bound."""
 
+    @property
+    def stays_whole(self) -> bool:
+        """Whether bodies of hard sides do not come apart along these."""
+
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
@@ -168,7 +172,7 @@ def cut_gluing(
     if sieve is not None:
         gone = partition_pairs(gluing, positions, one_sided)
     crowded = bool(gone.any())
-    if search is not None and avoid is None:
+    if search is not None and avoid is None and not search.stays_whole:
         gone |= hard_borders(surface, gluing, positions, gone, search.wants)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]

@@ -20,7 +20,18 @@ from .chart_indices import all_within, but_within, edge_set, identity, is_marked
 from .chart_map import ChartMap, local_shear, measured_map
 from .convex_maps import with_figures
 from .mirrored_charts import mapped_anew
-from .shear_search import MARGIN, MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, ShearSearch, joined, pressing_shear
+from .shear_search import (
+    MARGIN,
+    MOST_STEEP,
+    NEARLY,
+    NO_EXCESS,
+    STEEP,
+    Asked,
+    Round,
+    ShearSearch,
+    joined,
+    pressing_shear,
+)
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
@@ -49,6 +60,8 @@ SPARED = 0.05
 # cut would go across what lies flat along its edges.
 LARGE_PART = 0.03
 UNSHEARED = 1.001
+# Of charts with more vertices cuts are straight, but for what the search has no eye for.
+IN_STEPS = 10000
 # Charts that shear more come apart around flat sides, where that leaves no more than this share of log(shear).
 SHEARED_SIDES = 1.05
 LEFT = 0.5
@@ -126,8 +139,9 @@ def bound_shear(
             break
         share, promised = last.shares(missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
-        changes = {"share": share, "adding": rounds > 1} | rehearsed  # Another draw may be worse, what is added is not.
-        asked = _Asked.of(last, missed, apart, flat, spread, changes, tried)
+        # Another draw may be worse, what is added is not.
+        changes = {"share": share, "adding": rounds > 1, "stays_whole": last.is_cut_further(rounds)} | rehearsed
+        asked = Asked.of(last, missed, apart, flat, spread, changes, tried)
         anew = _cut_anew(search, last, asked, map_charts, early)
         new = yield from part_of(anew, begin + width * PARTING, width * (1 - PARTING))
         if new is None:
@@ -160,7 +174,7 @@ def _first_round(
     sides = {k: edges for k, edges in sides.items() if len(edges)}
     if not sides:
         return first
-    asked = _Asked.of(first, [], sides, list(sides), search.first_spread(), {}, set())
+    asked = Asked.of(first, [], sides, list(sides), search.first_spread(), {}, set())
     new = yield from _cut_anew(search, first, asked, map_charts, early)
     if new is None:
         return first
@@ -170,35 +184,7 @@ def _first_round(
     return first if stay.all() else first.merged(search, new, of, stay)
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """Numbers of charts to be cut anew for a spread (f,), the edges (k,2) that stay cut all the same, what changes in
-    the search, and whether edges (k,2) that it comes to are worth a map."""
-
-    charts: list[int]
-    kept: np.ndarray
-    spread: np.ndarray
-    changes: dict[str, Any]
-    is_worth: Callable[[np.ndarray], bool]
-
-    @staticmethod
-    def of(
-        last: Round,
-        missed: list[int],
-        apart: dict[int, np.ndarray],
-        flat: list[int],
-        spread: np.ndarray,
-        changes: dict[str, Any],
-        tried: set[bytes],
-    ) -> _Asked:
-        """What is asked of charts of a round that missed the bound, and of what is left of those that come apart around
-        flat sides; worth a map is what was not tried."""
-        chosen = [*missed, *flat]
-        kept = [but_within(last.kept(missed), [last.charts[k] for k in flat]), *apart.values()]
-        return _Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
-
-
-def _cut_anew(search: ShearSearch, last: Round, asked: _Asked, map_charts, early: EarlyEnd) -> Steps[Round | None]:
+def _cut_anew(search: ShearSearch, last: Round, asked: Asked, map_charts, early: EarlyEnd) -> Steps[Round | None]:
     """The next round; the last one where what was found is not worth a map, and None where the end was asked for."""
     memory = dict(last.memory)
     chosen = [last.charts[k] for k in asked.charts]
@@ -220,8 +206,9 @@ def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, ear
     """The last round with areas spared where it misses the bound, and with shorter cuts where it does not."""
     if last.excess:
         return (yield from _with_areas_spared(search, last, map_sparing, early))
-    last = yield from part_of(_taken_back(search, last, map_charts, early), 0.0, 0.5)
-    return (yield from part_of(_parts_cut_anew(search, last, map_charts, early), 0.5, 0.5))
+    last = yield from part_of(_taken_back(search, last, map_charts, early), 0.0, 0.4)
+    last = yield from part_of(_parts_cut_anew(search, last, map_charts, early), 0.4, 0.3)
+    return (yield from part_of(_straightened(search, last, map_charts, early), 0.7, 0.3))
 
 
 def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: EarlyEnd) -> Steps[Round]:
@@ -254,7 +241,7 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
         for chart in longer:
             share[last.charts[chart].faces] = last.share_allowed(chart) ** hope
         spread = search.first_spread() * share**SPREAD_BY_SHEAR
-        asked = _Asked(longer, kept, spread, {"share": share, "adding": True}, is_worth)
+        asked = Asked(longer, kept, spread, {"share": share, "adding": True}, is_worth)
         cutting = _cut_anew(search, last, asked, map_charts, early)
         new = yield from part_of(cutting, k / len(HOPES), 1 / len(HOPES))
         if new is None or new is last:
@@ -276,15 +263,34 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     if len(last.charts) < 2 or not parts:
         return last
     kept = but_within(last.cuts.edges, [last.charts[k] for k in parts])
-    asked = _Asked(parts, kept, search.first_spread(), {}, lambda edges: edge_set(edges) != edge_set(last.cuts.edges))
+    asked = Asked(parts, kept, search.first_spread(), {}, lambda edges: edge_set(edges) != edge_set(last.cuts.edges))
     new = yield from _cut_anew(search, last, asked, map_charts, early)
     if new is None or new is last:
         return last
-    of = last.chart_of(search, new)
-    missed = np.bincount(of, new.pressing > new.bound, len(last.charts)) > 0
+    of, count = last.chart_of(search, new), len(last.charts)
+    missed = np.bincount(of, new.pressing > new.bound, count) > 0
+    sprawls = np.bincount(of, new.extent > np.maximum(last.extent[of], COMPACT * np.sqrt(last.area.sum())), count) > 0
     # The outline of a part is there before and after.
-    shorter = np.bincount(of, new.outline_length, len(last.charts)) < last.outline_length
-    stay = missed | ~shorter
+    stay = missed | sprawls | (np.bincount(of, new.outline_length, count) >= last.outline_length)
+    return last if stay.all() else last.merged(search, new, of, stay)
+
+
+def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
+    """A round within the bound with cuts that turn less, where their charts keep it, too: among the sides of quads many
+    ways are as short as each other, and most of them go in steps."""
+    chosen = [k for k, chart in enumerate(last.charts) if len(chart.vertices) <= IN_STEPS and last.found_for(k)]
+    if not chosen:
+        return last
+    changes = {"share": np.ones(search.count), "straighter": True, "stays_whole": True}
+    differs = edge_set(last.cuts.edges)
+    asked = Asked(chosen, last.kept(chosen), search.first_spread(), changes, lambda edges: edge_set(edges) != differs)
+    new = yield from _cut_anew(search, last, asked, map_charts, early)
+    if new is None or new is last:
+        return last
+    of, count = last.chart_of(search, new), len(last.charts)
+    # Another cut may come apart, along folds, or miss the bound.
+    good = (np.bincount(of, minlength=count) == 1) & (np.bincount(of, new.pressing > new.bound, count) == 0)
+    stay = ~(good & (np.bincount(of, new.outline_price, count) < last.outline_price))
     return last if stay.all() else last.merged(search, new, of, stay)
 
 
@@ -311,7 +317,8 @@ def _apart(
 
     for k in chosen:
         mean, whole = last.mean[k], identity(last.charts[k]) in worse
-        edges = np.zeros((0, 2), np.int64) if whole or mean <= last.bound else flat_sides(last.charts[k])
+        stays = whole or mean <= last.bound or last.is_cut_further(rounds)
+        edges = np.zeros((0, 2), np.int64) if stays else flat_sides(last.charts[k])
         if len(edges):
             flat.append(k)
         elif crossing is not None and not whole and _may_cross(last, k, late, rounds):

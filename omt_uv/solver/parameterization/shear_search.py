@@ -7,21 +7,22 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
+from ..analysis.straight_paths import TURN
 from ..analysis.symmetry_plane import MirrorImages
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
-from ..mesh.geometry import edge_lengths
+from ..mesh.geometry import edge_lengths, unit
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import Steps, part_of
-from .chart_indices import all_within, identity, is_marked, outline
+from .chart_indices import all_within, but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
@@ -307,6 +308,28 @@ class Round:
         outlines = [edge_lengths(chart.vertices, boundary_edges(chart.triangles)) for chart in self.charts]
         return np.array([float(lengths.sum()) for lengths in outlines])
 
+    @property
+    def extent(self) -> np.ndarray:
+        """How far each map (k,) extends."""
+        return np.array([np.hypot(*np.ptp(one.uv, axis=0)) for one in self.maps])
+
+    @property
+    def outline_price(self) -> np.ndarray:
+        """The same (k,) with a price on turns, see `straight_paths`."""
+        prices = []
+        for chart in self.charts:
+            tail, head = boundary_edges(chart.triangles).T
+            along = chart.vertices[head] - chart.vertices[tail]
+            onwards = np.argsort(tail)[np.searchsorted(np.sort(tail), head)]
+            length, direction = np.linalg.norm(along, axis=1), unit(along)
+            bend = 1 - (direction * direction[onwards]).sum(axis=1)
+            prices.append(float((length + TURN * bend * (length + length[onwards]) / 2).sum()))
+        return np.array(prices)
+
+    def is_cut_further(self, rounds: int) -> bool:
+        """Whether pieces are cut further before they may come apart: limbs of a soft body can be hard by themselves."""
+        return rounds == 1 and len(self.settled) > 0
+
     def share_allowed(self, k: int) -> float:
         """How many times the square of log(shear) of chart k may be."""
         return float(MARGIN * np.log(self.bound) ** 2 / np.log(self.pressing[k]) ** 2)
@@ -327,6 +350,34 @@ class Round:
         missing, then = (float(each.area[each.searched].sum()) for each in (self, before))
         is_as_much = self.excess > (1 - LITTLE) * before.excess and missing > (1 - LITTLE) * then
         return is_as_much and self.excess > NEARLY * self.bound
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Numbers of charts to be cut anew for a spread (f,), the edges (k,2) that stay cut all the same, what changes in
+    the search, and whether edges (k,2) that it comes to are worth a map."""
+
+    charts: list[int]
+    kept: np.ndarray
+    spread: np.ndarray
+    changes: dict[str, Any]
+    is_worth: Callable[[np.ndarray], bool]
+
+    @staticmethod
+    def of(
+        last: Round,
+        missed: list[int],
+        apart: dict[int, np.ndarray],
+        flat: list[int],
+        spread: np.ndarray,
+        changes: dict[str, Any],
+        tried: set[bytes],
+    ) -> Asked:
+        """What is asked of charts of a round that missed the bound, and of what is left of those that come apart around
+        flat sides; worth a map is what was not tried."""
+        chosen = [*missed, *flat]
+        kept = [but_within(last.kept(missed), [last.charts[k] for k in flat]), *apart.values()]
+        return Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
 
 
 def pressing_shear(mean: float, steep: float, bound: float) -> float:

@@ -215,14 +215,15 @@ def promised(decrement: Number, energy: Number) -> Number:
     return decrement / np.maximum(energy, NO_ENERGY)
 
 
-def left_over(energy: Number, share: Number, gain: Number, decrement: Number) -> np.ndarray:
+def left_over(energy: Number, share: Number, gain: Number, decrement: Number, before: Number = np.inf) -> np.ndarray:
     """Residual after a step to this energy: what the next one can be expected to promise, over the energy; see LEFT.
 
-    share, gain, decrement: as in `next_pressure`
+    share, gain, decrement: as in `next_pressure`; before: the residual of the step before. Where steps shrink by the
+    same share each, as from a map that is sheared all over, the next one does, too.
     """
-    missed = 1 - gain / np.maximum(decrement, NO_ENERGY)
-    expected = np.clip(BENT * np.square(missed), LEFT, 1)
-    return promised(decrement, energy) * np.where((share == 1) & (energy < EASY), expected, 1)
+    missed, residual = 1 - gain / np.maximum(decrement, NO_ENERGY), promised(decrement, energy)
+    expected = np.clip(np.maximum(BENT * np.square(missed), residual / before), LEFT, 1)
+    return residual * np.where((share == 1) & (energy < EASY), expected, 1)
 
 
 def first_pressure(quality: Quality, balance: float, free: bool) -> float:

@@ -74,13 +74,13 @@ class CoarseCut:
         """Whether it is far from its bound, and nothing more can be cut."""
         return self.cut.spread > STUCK * self.task.bound
 
-    def carried(self, component: CutComponent) -> Found:
-        """The same, led along the edges of the component."""
+    def carried(self, component: CutComponent, straighter: bool = False) -> Found:
+        """The same, led along the edges of the component; straighter: with fewer turns."""
         start, coarse = component.on_boundary(), self.setting.coarse
         start[component.ends[self.base].ravel()] = True
         if self.setting.is_closed:
             start[coarse.kept[self.task.graph.boundary]] = True
-        edges = carried(component, coarse, self.task.graph, self.cut.steps, start, self.mirror)
+        edges = carried(component, coarse, self.task.graph, self.cut.steps, start, self.mirror, straighter)
         root = int(np.argmax(self.task.graph.boundary))
         polygons = component.polygons[component.polygons >= 0]
         return Found(self.base | edges, self.base, self.mirror, coarse, self.cut.steps, root, polygons)

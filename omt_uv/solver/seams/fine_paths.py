@@ -26,6 +26,8 @@ ASIDE = 3.0
 ASTRAY = 0.5
 # A line of edges by the plane of a mirror that is none of edges may be left by so many edges to be straight.
 ALONG = 3.0
+# And a way along the sides of polygons, to have fewer steps.
+FEWER_STEPS = 2.0
 # So many times as far where no path is found there, at first and then: costs say little of the lengths of needles.
 WIDER = (8.0, 64.0, np.inf)
 
@@ -65,10 +67,12 @@ def carried(
     steps: np.ndarray,
     start: np.ndarray,
     mirror: FineMirror | None,
+    straighter: bool = False,
 ) -> np.ndarray:
     """Edges (e,) bool of a component along steps (k,) over its coarse surface.
 
-    start (n,) bool: vertices that are on a boundary or cut already, from which paths set out.
+    start (n,) bool: vertices that are on a boundary or cut already, from which paths set out; straighter: paths may
+    leave those over the coarse surface where that is the fine one, too.
     """
     fine = FineGraph.of(component)
     # Diagonals need not be mirrored; paths run along edges that are, where there is such a way. Scans have none.
@@ -78,6 +82,7 @@ def carried(
     # What the coarse surface does not tell: where it is the fine one, paths are there already.
     unsure = spacing * max(1 - np.sqrt(len(coarse.kept) / component.vertex_count), 0.0)
     edge = float(np.median(component.length)) if len(component.length) else 0.0
+    aside = max(unsure, FEWER_STEPS * edge * straighter)
     paths = []
     waiting = _outwards(graph, steps)
     while waiting:
@@ -95,7 +100,7 @@ def carried(
             waiting = [stretch[: missed + 2], stretch[missed + 1 :], *waiting]
             continue
         if not in_plane:
-            path = half.straightened(path, used | ~allowed, unsure)
+            path = half.straightened(path, used | ~allowed, aside)
         elif mirror is not None and not mirror.exact:
             path = fine.straightened(path, used, ALONG * edge)
         used[path] = True
@@ -106,7 +111,7 @@ def carried(
             if not (fine.joined(image) and used[image[-1]]):
                 allowed = ~(mirror.side | mirror.plane) | used
                 image = fine.path(used, int(image[0]), image, spacing / 2, allowed)
-                image = fine.straightened(image, used | ~allowed, unsure)
+                image = fine.straightened(image, used | ~allowed, aside)
             used[image] = True
             paths.append(image)
     return _forest(component, edges_along(component, paths), start)

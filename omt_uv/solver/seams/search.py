@@ -77,6 +77,8 @@ class SeamSearch:
     options : see `SearchOptions`
     share (f,) : of the spread that cuts left which were found before, that is asked for now; None for a first search
     adding : what was found for a part stays, and more is cut
+    straighter : what was found for a part stays, but is led along edges that turn less
+    stays_whole : bodies of hard sides do not come apart along these
     memory : what was found for parts, by their fingerprints, to which this search adds
     begun : surfaces of components on their way to coarse ones, and their triangles
     asked : the square of log(shear) that maps may have
@@ -93,6 +95,8 @@ class SeamSearch:
     options: SearchOptions = field(default_factory=SearchOptions)
     share: np.ndarray | None = None
     adding: bool = False
+    straighter: bool = False
+    stays_whole: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
     begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
     asked: float = 0.0
@@ -243,8 +247,11 @@ class SeamSearch:
 
     def _again(self, component: CutComponent, found: Found, share: float) -> Steps[Found]:
         """A cut with a share of the square of log(shear) that another has left: that one grown on, or where much is
-        missing or its coarse surface is too coarse for that, one on finer surfaces."""
+        missing or its coarse surface is too coarse for that, one on finer surfaces. Or the same, but straighter."""
         best, spread = None, share**SPREAD_BY_SHEAR
+        if self.straighter:
+            edges = self._recalled(component, found, 1.0).carried(component, straighter=True).edges
+            return replace(found, edges=edges)
         told = found.rehearsed if self.rehearse is not None else None
         if self.adding or share >= CLOSE or (told is not None and share >= NEARLY_THERE):
             best = yield from part_of(self._added(component, found, spread), 0.0, GROWN / 2)

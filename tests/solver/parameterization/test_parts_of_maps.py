@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.analysis.straight_paths import TURN
 from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import MeshError, PinError
 from omt_uv.solver.mesh.charts import Chart
@@ -277,7 +278,7 @@ def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
 @pytest.mark.parametrize("excess", [False, True])
 def test_a_round_is_made_shorter_only_within_the_bound(excess, monkeypatch):
     calls = []
-    for name in ("_with_areas_spared", "_taken_back", "_parts_cut_anew"):
+    for name in ("_with_areas_spared", "_taken_back", "_parts_cut_anew", "_straightened"):
 
         def steps(search, last, *_, name=name):
             calls.append(name)
@@ -287,7 +288,7 @@ def test_a_round_is_made_shorter_only_within_the_bound(excess, monkeypatch):
         monkeypatch.setattr(shear_bound, name, steps)
     last = round_of([1], [1.5 if excess else 1.2])
     assert drain(shear_bound._made_shorter(None, last, None, None, EarlyEnd())) is last
-    assert calls == (["_with_areas_spared"] if excess else ["_taken_back", "_parts_cut_anew"])
+    assert calls == (["_with_areas_spared"] if excess else ["_taken_back", "_parts_cut_anew", "_straightened"])
 
 
 @pytest.mark.parametrize(
@@ -326,6 +327,64 @@ def test_shorter_cuts_are_taken_where_they_keep_the_bound(outcomes, kept, monkey
         assert what.charts == [0] and what.changes["adding"]
         # Both edges are of length 1.414, or one less is shorter by half.
         assert what.is_worth(np.array([[0, 1]])) and not what.is_worth(np.array([[0, 1], [1, 2]] * 2))
+
+
+def test_the_price_of_an_outline_is_its_length_and_its_turns():
+    V, F = meshes.quad_patch()
+    one = round_of([1], [1.1], charts=[chart_of(V, F)], maps=[map_of(2 * V[:, :2])])
+    # Four sides of length 1, and four right angles between such.
+    assert one.outline_price[0] == pytest.approx(4 + 4 * TURN) and one.extent[0] == pytest.approx(2 * np.sqrt(2))
+    V, F = meshes.grid(3, 3, 1.0, 1.0)
+    straight, stepped = round_of([1], [1.1], charts=[chart_of(V, F)]), F[~(F == 0).any(axis=1)]
+    used, stepped = np.unique(stepped, return_inverse=True)
+    notched = round_of([1], [1.1], charts=[chart_of(V[used], stepped.reshape(-1, 3))])
+    assert straight.outline_price[0] == pytest.approx(4 + 4 * TURN / 3)
+    assert notched.outline_price[0] > straight.outline_price[0]
+
+
+@pytest.mark.parametrize(
+    "pressing, prices, parts, taken",
+    [
+        ([1.3, 1.2], [9, 9], [0, 1], [True, False]),
+        ([1.3, 1.2], [9, 7], [0, 1], [True, True]),
+        ([1.4, 1.2], [9, 7], [0, 1], [False, True]),
+        ([1.4, 1.2], [9, 9], [0, 1], [False, False]),
+        ([1.3, 1.2, 1.2], [4, 4, 7], [0, 0, 1], [False, True]),
+    ],
+)
+def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, prices, parts, taken, monkeypatch):
+    def with_prices(one, prices):
+        return SimpleNamespace(
+            pressing=np.array(one, float), bound=1.35, outline_price=np.array(prices, float), charts=list(one)
+        )
+
+    chart = SimpleNamespace(vertices=np.zeros((5, 3)))
+    last, new = with_prices([1.3, 1.3], [10, 8]), with_prices(pressing, prices)
+    last.charts, last.cuts, last.found_for = [chart, chart], cuts_of([[0, 1]]), lambda k: ["found"]
+    last.kept = lambda chosen: asked.append(chosen)
+    last.chart_of = lambda search, other: np.array(parts)
+    last.merged = lambda search, other, of, stay: stay
+    asked = []
+
+    def cut_anew(search, before, what, map_charts, early):
+        asked.append(what)
+        return new
+        yield
+
+    monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
+    search = SimpleNamespace(count=3, first_spread=lambda: np.full(3, 0.2))
+    found = drain(shear_bound._straightened(search, last, None, EarlyEnd()))
+    assert found is last if not any(taken) else (~found).tolist() == taken
+    assert asked[0] == [0, 1] and asked[1].changes["straighter"] and asked[1].changes["stays_whole"]
+    assert asked[1].is_worth(np.array([[1, 2]])) and not asked[1].is_worth(np.array([[1, 0]]))
+
+
+def test_nothing_is_straightened_that_no_search_has_found_or_is_large(monkeypatch):
+    monkeypatch.setattr(shear_bound, "IN_STEPS", 4)
+    large, small = (SimpleNamespace(vertices=np.zeros((n, 3))) for n in (5, 4))
+    for chart, found in ((large, ["found"]), (small, [])):
+        last = SimpleNamespace(charts=[chart], found_for=lambda k, found=found: found)
+        assert drain(shear_bound._straightened(None, last, None, EarlyEnd())) is last
 
 
 def test_nothing_is_taken_back_where_nothing_has_slack():

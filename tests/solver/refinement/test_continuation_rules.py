@@ -160,6 +160,14 @@ def test_only_a_whole_step_that_kept_its_promise_leaves_less_than_it_promised():
         assert following <= 0.5 * said and said < 2 * decrement
 
 
+def test_what_shrinks_by_the_same_share_with_every_step_leaves_that_share():
+    # The step kept its promise, and promised `share` of what the one before had.
+    for share in (0.2, 0.6, 1.0, 3.0):
+        residual, left = 0.03 / 0.3, rules.left_over(0.3, 1.0, 0.03, 0.03, before=0.03 / 0.3 / share)
+        assert left == pytest.approx(residual * min(share, 1.0))
+    assert rules.left_over(0.3, 1.0, 0.03, 0.03) == pytest.approx(rules.LEFT * 0.1)
+
+
 def test_only_free_boundaries_with_areas_about_right_begin_with_soft_areas():
     for name, soft in (("standard", True), ("draft", True), ("exact", False)):
         first = rules.first_pressure(QUALITIES[name], 0.0, True)

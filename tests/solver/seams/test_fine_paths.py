@@ -23,8 +23,8 @@ def test_what_is_carried_is_a_forest_that_hangs_on_the_boundary(monkeypatch, spr
     V, F = meshes.cap(14, 28, 0.9)
     seen = []
 
-    def watched(component, coarse, graph, steps, start, mirror):
-        seen.append((component, start, carried(component, coarse, graph, steps, start, mirror)))
+    def watched(component, coarse, graph, steps, start, *rest):
+        seen.append((component, start, carried(component, coarse, graph, steps, start, *rest)))
         return seen[-1][-1]
 
     monkeypatch.setattr(coarse_cut, "carried", watched)
@@ -112,6 +112,30 @@ def test_a_path_that_is_carried_is_straight():
     assert max(turns) < 60
 
 
+def test_steps_along_the_sides_of_quads_are_fewer_where_that_is_asked_for():
+    n = 12
+    V, _ = meshes.bumpy(n, n, 0.15, 1.0)
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    quads = np.column_stack([corner, corner + 1, corner + n + 2, corner + n + 1])
+    component = _component_of(meshes.polygon_surface(V, quads.tolist()))
+    start = component.on_boundary()
+    coarse = coarsening(component.positions, component.triangles, len(V), None).ended(len(V))
+    graph = path_graph(coarse, np.ones(len(V)), start[coarse.kept])
+    # From the lower side inwards, up and to the right by turns.
+    stairs = np.cumsum([3] + [n + 1, n + 1] + [1, n + 1] * 3)
+    way = _places(component, coarse, V, stairs)[::-1]
+    lengths, turns = [], []
+    for straighter in (False, True):
+        chosen = carried(component, coarse, graph, graph.steps_of(way), start, None, straighter)
+        assert coarse.kept[way[0]] in component.ends[chosen] and start[component.ends[chosen]].any()
+        ends = component.ends[chosen]
+        along = unit(component.positions[ends[:, 1]] - component.positions[ends[:, 0]])
+        meeting = [np.flatnonzero((ends == v).any(axis=1)) for v in np.unique(ends)]
+        lengths.append(component.length[chosen].sum())
+        turns.append(sum(abs(along[one] @ along[other]) < 0.5 for one, other in (m for m in meeting if len(m) == 2)))
+    assert turns[0] >= 5 and turns[1] <= turns[0] / 2 and lengths[1] <= 1.01 * lengths[0]
+
+
 def test_a_straighter_path_stays_near_the_one_that_was_found_and_off_what_is_blocked():
     component, coarse, _, way, _ = _slanting()
     graph = FineGraph.of(component)
@@ -149,6 +173,10 @@ def _places(component, coarse, V, vertices):
 
 def _component(V, F):
     """The one component of a disk, as searches get it."""
+    return _component_of(triangle_surface(V, F))
+
+
+def _component_of(surface):
     seen = []
 
     class Watching(SeamSearch):
@@ -157,8 +185,7 @@ def _component(V, F):
             yield from ()
             return base
 
-    surface = triangle_surface(V, F)
-    cut(surface, search=Watching(np.full(len(F), 1.0), surface, lambda: seam_costs(surface)))
+    cut(surface, search=Watching(np.full(len(surface.face_start) - 1, 1.0), surface, lambda: seam_costs(surface)))
     return seen[0]
 
 
