@@ -16,7 +16,7 @@ from ..mesh.geometry import face_areas
 from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import COMPACT, SPREAD_BY_SHEAR
-from .chart_indices import all_within, but_within, edge_set, identity, is_marked, outline
+from .chart_indices import but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear, measured_map
 from .convex_maps import with_figures
 from .mirrored_charts import mapped_anew
@@ -102,18 +102,14 @@ def bound_shear(
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
     crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
-    map_sparing : a solver that shears less, for areas which are no more exact than is promised; of_pieces : charts came
-    off a whole whose seams were searched: those that miss the bound keep what was cut of them, and are cut further.
-    Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
+    map_sparing : a solver that shears less, for areas no more exact than is promised; of_pieces : charts are pieces of
+    a whole that was searched. Progress offers an early end: with the maps of the last round. Errors: see `map_charts`.
     """
     early, free = EarlyEnd(), crossing is not None
     best = last = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
-    if of_pieces:
-        # A search of one by itself would begin anew, and predicts it no better than the whole.
-        best = last = replace(last, settled=all_within([last.charts[k] for k in last.searched]))
-    spread, promised = search.first_spread(), np.full(search.count, np.inf)
-    tried, worse = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]]()
-    rehearsed, crossed = dict[str, Any](), False
+    best = last = last.settled_where_searched() if of_pieces else last
+    spread, promised, crossed = search.first_spread(), np.full(search.count, np.inf), False
+    tried, worse, rehearsed = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]](), dict[str, Any]()
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
             # What coarse maps tell does not hold here, or it is no use to part what lies on itself.
@@ -129,24 +125,22 @@ def bound_shear(
             if not spared.searched:
                 return _result(spared, search, first.warnings, early)
         is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
-        parting = _apart(search, last, crossing, rounds, worse)
-        parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
+        parting = part_of(_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
+        parts = yield from unless_ended(parting, early)
         if parts is None or (is_stuck and not parts[0]):
             break
         apart, flat, crossed = parts
-        missed = last.to_be_searched(apart)
-        if not (missed or apart):
+        if not ((missed := last.to_be_searched(apart)) or apart):
             break
         share, promised = last.shares(missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
-        # Another draw may be worse, what is added is not.
-        changes = {"share": share, "adding": rounds > 1, "stays_whole": last.is_cut_further(rounds)} | rehearsed
+        changes = {"share": share} | last.changes(rounds) | rehearsed
         asked = Asked.of(last, missed, apart, flat, spread, changes, tried)
         anew = _cut_anew(search, last, asked, map_charts, early)
         new = yield from part_of(anew, begin + width * PARTING, width * (1 - PARTING))
         if new is None:
             break
-        if new is not last:  # Else it has not kept what it promised, and so more is asked for.
+        if new is not last:  # Else more is asked for.
             tried.add(edge_set(new.cuts.edges))
             last, worse = last.with_what_is_better(search, new, worse)
     else:

@@ -326,6 +326,16 @@ class Round:
             prices.append(float((length + TURN * bend * (length + length[onwards]) / 2).sum()))
         return np.array(prices)
 
+    def settled_where_searched(self) -> Round:
+        """The same, where charts that miss the bound keep what was cut of them and are cut further: a search of one by
+        itself would begin anew, and predicts it no better than one of the whole."""
+        return replace(self, settled=all_within([self.charts[k] for k in self.searched]))
+
+    def changes(self, rounds: int) -> dict[str, Any]:
+        """What a search that is made again differs in, by the number of the round."""
+        # Another draw may be worse, what is added is not.
+        return {"adding": rounds > 1, "stays_whole": self.is_cut_further(rounds)}
+
     def is_cut_further(self, rounds: int) -> bool:
         """Whether pieces are cut further before they may come apart: limbs of a soft body can be hard by themselves."""
         return rounds == 1 and len(self.settled) > 0

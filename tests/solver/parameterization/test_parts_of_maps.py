@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -327,6 +328,13 @@ def test_shorter_cuts_are_taken_where_they_keep_the_bound(outcomes, kept, monkey
         assert what.charts == [0] and what.changes["adding"]
         # Both edges are of length 1.414, or one less is shorter by half.
         assert what.is_worth(np.array([[0, 1]])) and not what.is_worth(np.array([[0, 1], [1, 2]] * 2))
+
+
+@pytest.mark.parametrize("settled", [[], [3]])
+def test_pieces_that_are_cut_further_stay_whole_in_the_first_round(settled):
+    one = replace(round_of([1], [1.5]), settled=np.array(settled, np.int64))
+    assert one.changes(1) == {"adding": False, "stays_whole": bool(settled)}
+    assert one.changes(2) == {"adding": True, "stays_whole": False}
 
 
 def test_the_price_of_an_outline_is_its_length_and_its_turns():

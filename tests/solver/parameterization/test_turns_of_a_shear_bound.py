@@ -23,7 +23,6 @@ class Made:
     mean_missed: bool = True
     hardly: bool = False
     nothing: bool = False
-    further: bool = False
     shares_asked: list = field(default_factory=list)
 
     @property
@@ -43,8 +42,8 @@ class Made:
     def is_hardly_better(self, other):
         return self.hardly
 
-    def is_cut_further(self, rounds):
-        return self.further and rounds == 1
+    def changes(self, rounds):
+        return {"adding": rounds > 1}
 
     def to_be_searched(self, apart):
         return [] if self.nothing or apart else [0]
@@ -154,13 +153,6 @@ def test_rounds_go_on_until_the_bound_is_kept(bounded):
     assert [r.shares_asked[0][1] for r in rounds[:2]] == [[np.inf], [0.25]]
     # Every round takes half of what is left, the last what the search for shorter cuts does.
     assert fractions[2:6] == pytest.approx([0, 0.15, 0.15, 0.5]) and fractions[-2:] == pytest.approx([0.75, 1.0])
-
-
-@pytest.mark.parametrize("further", [False, True])
-def test_pieces_that_are_cut_further_stay_whole_in_the_first_round(bounded, further):
-    rounds = Made("first", 3.0, further=further), Made("second", 2.0, further=further), Made("third")
-    requests = [a[2] for a in bounded(*rounds)[1] if a[0] == "cut"]
-    assert [w.changes["stays_whole"] for w in requests] == [further, False]
 
 
 def test_no_more_than_so_many_rounds(bounded):
