@@ -142,7 +142,7 @@ def test_evened_maps_are_the_best_before_double_precision_ends(fails, monkeypatc
     angle = 2 * np.pi * np.arange(len(loop)) / len(loop)
     uv = tutte.tutte(V, F, loop, np.column_stack([np.cos(angle), np.sin(angle)]))
     faces = elements(V, F, face_areas(V, F))
-    whole, calls = tutte._weighted, []
+    whole, calls = tutte._Means.of, []
 
     def weighted(*given):
         calls.append(None)
@@ -150,7 +150,7 @@ def test_evened_maps_are_the_best_before_double_precision_ends(fails, monkeypatc
             raise errors.PrecisionError("no")
         return whole(*given)
 
-    monkeypatch.setattr(tutte, "_weighted", weighted)
+    monkeypatch.setattr(tutte._Means, "of", weighted)
     monkeypatch.setattr(tutte, "_goes_on", lambda *_: True)
     found = tutte.evened_tutte(V, loop, uv, faces, 1.0, patient=lambda: True)
     if fails == 0:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
-from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, plural, positive_density
+from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, positive_density
 from ..freed_memory import give_back_of
 from ..maps.contacts import touches_itself
 from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
@@ -58,8 +58,7 @@ UNROLLED = 1e-4
 # Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
 NO_ROOM = 1e-7
 PARTED = "parts that single edges cut off take more than all of a circle"
-# Coordinates of no vertices.
-NOWHERE = np.zeros((0, 2))
+NOWHERE = np.zeros((0, 2))  # coordinates of no vertices
 # What is said, after their number, of faces of a map that is returned all the same.
 FOLDED = "faces are folded or without area in the map"
 
@@ -245,16 +244,6 @@ def no_map(chart: Chart, failure: MeshError) -> ChartMap:
         folds=len(np.unique(chart.faces)),
         failure=failure,
     )
-
-
-def cut_for_a_map(first: list[ChartMap], maps: list[ChartMap]) -> list[str]:
-    """What is to be said of charts that had no map at first; their error where that is so at last, too."""
-    failure = next((one.failure for one in maps if one.failure is not None), None)
-    if failure is not None:
-        raise failure
-    count = sum(one.failure is not None for one in first)
-    who = plural(count, "An island along its seams has", "{} islands along their seams have")
-    return [f"{who} no map in double precision; cut further"] if count else []
 
 
 def _stages(uv: np.ndarray, conformal, cells, figures: Distortion, log: RunLog, warnings: tuple[str, ...]) -> ChartMap:

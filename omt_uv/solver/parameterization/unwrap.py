@@ -32,7 +32,7 @@ from .chart_indices import (
     located,
     pins_of_chart,
 )
-from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, no_map, refined_again
+from .chart_map import WITHOUT_MAP, ChartMap, no_map, refined_again
 from .convex_maps import with_convex_polygons, with_drawn_triangles, with_folds_counted
 from .mirrored_charts import (
     as_given,
@@ -166,6 +166,16 @@ def unwrap(
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)
     return SurfaceMap(charts, maps, cuts, (*said, *missed))
+
+
+def cut_for_a_map(first: list[ChartMap], maps: list[ChartMap]) -> list[str]:
+    """What is to be said of charts that had no map at first; their error where that is so at last, too."""
+    failure = next((one.failure for one in maps if one.failure is not None), None)
+    if failure is not None:
+        raise failure
+    count = sum(one.failure is not None for one in first)
+    who = plural(count, "An island along its seams has", "{} islands along their seams have")
+    return [f"{who} no map in double precision; cut further"] if count else []
 
 
 def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:

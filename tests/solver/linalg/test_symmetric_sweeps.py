@@ -131,7 +131,7 @@ def test_a_sweep_there_parts_and_a_sweep_back_are_those_vertex_by_vertex(joined)
         new = {v: moved(x, v) for v in colour}
         for v, place in new.items():
             x[2 * v : 2 * v + 2] = place
-    found = sweeps._preconditioner(rows, lambda left: 3 * (spread.T @ left), spread)(r)
+    found = sweeps._preconditioner(rows, lambda left: 3 * (spread.T @ left), sweeps.Motions(spread, plain=False))(r)
     np.testing.assert_allclose(found, x, atol=1e-9 * np.abs(x).max())
 
 

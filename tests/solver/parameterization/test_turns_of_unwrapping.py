@@ -19,7 +19,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import chart_map as chart_maps
 from omt_uv.solver.parameterization import unwrap as unwrapping
 from omt_uv.solver.parameterization.chart_indices import ChartPins, CornerPins
-from omt_uv.solver.parameterization.chart_map import ChartMap, cut_for_a_map, no_map
+from omt_uv.solver.parameterization.chart_map import ChartMap, no_map
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import CutCharts, SurfaceMap, map_small_charts
 from omt_uv.solver.progress import Progress, RunLog, drain
@@ -425,11 +425,11 @@ def test_charts_by_themselves_get_their_own_order_back(monkeypatch):
 
 def test_charts_without_a_map_are_counted_or_their_error_is_raised():
     fine, none = mapped(), no_map(chart(), PrecisionError("No"))
-    assert cut_for_a_map([fine, fine], [fine]) == []
-    assert cut_for_a_map([none, fine], [fine])[0].startswith("An island along its seams has no map")
-    assert cut_for_a_map([none, none], [fine])[0].startswith("2 islands along their seams have no map")
+    assert unwrapping.cut_for_a_map([fine, fine], [fine]) == []
+    assert unwrapping.cut_for_a_map([none, fine], [fine])[0].startswith("An island along its seams has no map")
+    assert unwrapping.cut_for_a_map([none, none], [fine])[0].startswith("2 islands along their seams have no map")
     with pytest.raises(PrecisionError):
-        cut_for_a_map([none], [fine, none])
+        unwrapping.cut_for_a_map([none], [fine, none])
 
 
 def test_the_corners_of_a_surface_have_the_places_of_their_charts():
