@@ -223,7 +223,7 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
     """A round within the bound with shorter cuts, where searches had asked for more than maps needed, if these keep
     the bound, too; as it is otherwise."""
     longer = [k for k in range(len(last.charts)) if last.has_slack(k)]
-    if not longer:
+    if not longer or not (longer := search.with_images(last.charts, longer)):
         return last
     kept = last.kept(longer)
 
@@ -273,7 +273,7 @@ def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd)
     """A round within the bound with cuts that turn less, where their charts keep it, too: among the sides of quads many
     ways are as short as each other, and most of them go in steps."""
     chosen = [k for k, chart in enumerate(last.charts) if len(chart.vertices) <= IN_STEPS and last.found_for(k)]
-    if not chosen:
+    if not chosen or not (chosen := search.with_images(last.charts, chosen)):
         return last
     changes = {"share": np.ones(search.count), "straighter": True, "stays_whole": True}
     differs = edge_set(last.cuts.edges)

@@ -149,6 +149,13 @@ class ShearSearch:
                 twin[k] = other
         return twin
 
+    def with_images(self, charts: list[Chart], chosen: list[int]) -> list[int]:
+        """The numbers of the chosen charts, with those of their mirror images: of two, the first is searched for both,
+        and neither where that one is not chosen."""
+        twin = self._twins(charts)
+        one = {k for k in chosen if twin[k] < 0}
+        return [k for k in range(len(charts)) if k in one or int(twin[k]) in one]
+
     def costs(self) -> SeamCosts:
         """What cutting the edges of the surface costs."""
         return self._costs

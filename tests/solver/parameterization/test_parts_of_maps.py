@@ -317,7 +317,10 @@ def test_shorter_cuts_are_taken_where_they_keep_the_bound(outcomes, kept, monkey
 
     monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
     search = SimpleNamespace(
-        count=3, first_spread=lambda: np.full(3, 0.2), surface=SimpleNamespace(positions=np.eye(4)[:, :3])
+        count=3,
+        first_spread=lambda: np.full(3, 0.2),
+        surface=SimpleNamespace(positions=np.eye(4)[:, :3]),
+        with_images=lambda charts, chosen: chosen,
     )
     found = drain(shear_bound._taken_back(search, last, None, EarlyEnd()))
     assert found is (last if kept is None else made[kept])
@@ -380,11 +383,27 @@ def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, 
         yield
 
     monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
-    search = SimpleNamespace(count=3, first_spread=lambda: np.full(3, 0.2))
+    search = SimpleNamespace(count=3, first_spread=lambda: np.full(3, 0.2), with_images=lambda charts, chosen: chosen)
     found = drain(shear_bound._straightened(search, last, None, EarlyEnd()))
     assert found is last if not any(taken) else (~found).tolist() == taken
     assert asked[0] == [0, 1] and asked[1].changes["straighter"] and asked[1].changes["stays_whole"]
     assert asked[1].is_worth(np.array([[1, 2]])) and not asked[1].is_worth(np.array([[1, 0]]))
+
+
+@pytest.mark.parametrize(
+    "twin, chosen, found",
+    [
+        ([-1, -1, -1], [0, 2], [0, 2]),
+        ([-1, 0, -1], [0], [0, 1]),
+        ([-1, 0, -1], [1, 2], [2]),
+        ([-1, -1, 0], [0, 1, 2], [0, 1, 2]),
+        ([-1, 0, -1], [1], []),
+    ],
+)
+def test_mirror_images_are_cut_anew_with_the_chart_that_is_searched(twin, chosen, found, monkeypatch):
+    monkeypatch.setattr(shear_search.ShearSearch, "_twins", lambda self, charts: np.array(twin))
+    search = shear_search.ShearSearch(None, None, ShearBound(1.3), None, {})
+    assert search.with_images([None] * 3, chosen) == found
 
 
 def test_nothing_is_straightened_that_no_search_has_found_or_is_large(monkeypatch):
