@@ -288,6 +288,15 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= LEAST_TOLD else f"less than {100 * LEAST_TOLD:.0f} %"
 
 
+def without_room(boundary: str, why: str) -> str:
+    """What is said of a chart whose boundary is free, since the one asked for has no room for it.
+
+    >>> without_room("disk", "2 faces stay folded")
+    'The disk has no room for this chart (2 faces stay folded); its boundary is free instead'
+    """
+    return f"The {boundary} has no room for this chart ({why}); its boundary is free instead"
+
+
 def plural(count: int, one: str, many: str) -> str:
     """What is said of one, or of several, whose number takes the place of the braces.
 

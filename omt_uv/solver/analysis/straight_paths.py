@@ -94,6 +94,19 @@ def turning_angles(positions: np.ndarray, path: np.ndarray) -> np.ndarray:
     return np.arctan2(cross, (along[:-1] * along[1:]).sum(axis=1))
 
 
+def closed_price(positions: np.ndarray, loop: np.ndarray) -> float:
+    """The price of a closed path (k,) of vertices (n,3): its length, and that of its turns."""
+    along = np.roll(positions[loop], -1, axis=0) - positions[loop]
+    length, direction = np.linalg.norm(along, axis=1), unit(along)
+    cosine = (direction * np.roll(direction, -1, axis=0)).sum(axis=1)
+    return float((length + _turns(cosine, length, np.roll(length, -1), TURN)).sum())
+
+
+def _turns(cosine: np.ndarray, before: np.ndarray, after: np.ndarray, turn: float) -> np.ndarray:
+    """Prices (k,) of turns with this cosine between edges of these prices (k,)."""
+    return turn * (1 - cosine) * (before + after) / 2
+
+
 def _loop(network: EdgeNetwork, path: np.ndarray, blocked: np.ndarray, turn: float) -> np.ndarray:
     """A path (k,) that ends where it starts, straightened by halves, and then across the middle."""
     if len(path) < 5:
@@ -126,8 +139,8 @@ def _path(network: EdgeNetwork, path: np.ndarray, blocked: np.ndarray, turn: flo
     onwards = head[there] != tail[here]
     here, there = here[onwards], there[onwards]
     a, b = edge[here], edge[there]
-    bend = 1 - (network.arriving[a] * network.leaving[b]).sum(axis=1)
-    price = network.price[b] + turn * bend * (network.price[a] + network.price[b]) / 2
+    cosine = (network.arriving[a] * network.leaving[b]).sum(axis=1)
+    price = network.price[b] + _turns(cosine, network.price[a], network.price[b], turn)
     # One more state, from which the edges at the start of the path are entered.
     enter, states = np.flatnonzero(tail == path[0]), len(edge)
     rows, columns = np.append(here, np.full(len(enter), states)), np.append(there, enter)

@@ -11,8 +11,6 @@ from scipy.sparse import csr_matrix
 LEAST_STIFFNESS = 1e-3
 # Rows of arrays that are worked on at a time, so few that what is computed from them stays in the cache.
 CHUNK = 1 << 14
-# Triangles whose gradients are found at a time: what is found on the way takes ten times their memory.
-HATS_AT_ONCE = 100_000
 # Triangles whose gradients are kept: of more, the sides that make them, which take half of the memory.
 KEPT_HATS = 400_000
 
@@ -287,73 +285,63 @@ def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarra
 
 def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Areas (m,) of triangles (m,3) and the gradients (m,3) complex of their hat functions, in their own planes."""
-    area, gradient = np.empty(len(triangles)), np.empty((len(triangles), 3), complex)
-    for begin in range(0, len(triangles), HATS_AT_ONCE):
-        here = slice(begin, begin + HATS_AT_ONCE)
-        area[here], gradient[here] = _hat_gradients(positions[triangles[here]])
-    return area, gradient
+    sides = _sides_of(positions, triangles)
+    return _areas_of(sides), part_by_part(gradients_of, sides)
 
 
 class Sides:
-    """What `gradients_of` makes the gradients of hat functions of, of triangles (m,3) with corners at (n,3). It is let
-    go while other things take all memory there is, and found again, to the bit, when it is asked for."""
+    """What `gradients_of` makes the gradients of hat functions of, sides (m,3) of triangles (m,3) with corners at
+    (n,3). They are let go while other things take all memory there is, and found again, to the bit, when asked for."""
 
-    def __init__(self, positions: np.ndarray, triangles: np.ndarray):
+    def __init__(self, positions: np.ndarray, triangles: np.ndarray, sides: np.ndarray):
         self._mesh = positions, triangles
-        self._sides: np.ndarray | None
-        self.area, self._sides = self._found()
+        self._sides: np.ndarray | None = sides
 
     def gradient(self, here: slice | np.ndarray) -> np.ndarray:
         """The gradients (k,3) complex of some triangles."""
-        sides = self._found()[1] if self._sides is None else self._sides
-        self._sides = sides
-        return gradients_of(sides[here])
+        if self._sides is None:
+            self._sides = _sides_of(*self._mesh)
+        return gradients_of(self._sides[here])
 
     def let_go(self) -> None:
         """Hold nothing until it is asked for."""
         self._sides = None
-
-    def _found(self) -> tuple[np.ndarray, np.ndarray]:
-        """Areas (m,), and the sides (m,3)."""
-        positions, triangles = self._mesh
-        area, sides = np.empty(len(triangles)), np.empty((len(triangles), 3))
-        for begin in range(0, len(triangles), HATS_AT_ONCE):
-            here = slice(begin, begin + HATS_AT_ONCE)
-            area[here], sides[here] = _sides(positions[triangles[here]])
-        return area, sides
 
 
 def kept_hats(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray | Sides]:
     """Areas (m,) of triangles (m,3), and their gradients (m,3), or what makes these where they are many."""
     if len(triangles) <= KEPT_HATS:
         return hat_gradients(positions, triangles)
-    sides = Sides(positions, triangles)
-    area, sides.area = sides.area, np.zeros(0)
-    return area, sides
+    sides = _sides_of(positions, triangles)
+    return _areas_of(sides), Sides(positions, triangles, sides)
 
 
-def _hat_gradients(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Areas and gradients of triangles with corners (m,3,3)."""
-    area, sides = _sides(p)
-    return area, gradients_of(sides)
+def _sides_of(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """`_sides` of triangles (m,3)."""
+    return part_by_part(lambda some: _sides(positions[some]), triangles)
 
 
-def _sides(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Areas (m,) of triangles with corners (m,3,3), how long their first side is, and where the third corner is seen
-    along it and across, (m,3)."""
+def _areas_of(sides: np.ndarray) -> np.ndarray:
+    """Areas (m,) of triangles with these sides (m,3), see `_sides`."""
+    return 0.5 * sides[:, 0] * sides[:, 2]
+
+
+def _sides(p: np.ndarray) -> np.ndarray:
+    """How long the first side of triangles with corners (m,3,3) is, and where the third corner is seen along it and
+    across, (m,3)."""
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     side = lengths(e1)
     x = np.einsum("md,md->m", e2, e1) / side
     y = lengths(cross3(e1, e2)) / side
     y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
-    return 0.5 * side * y, np.stack([side, x, y], axis=1)
+    return np.stack([side, x, y], axis=1)
 
 
 def gradients_of(sides: np.ndarray) -> np.ndarray:
     """Gradients (m,3) complex of the hat functions of triangles with these sides (m,3), see `_sides`: the opposite
     side, turned by a quarter, over twice the area."""
     side, x, y = sides.T
-    per, found = 1 / (2 * (0.5 * side * y)), np.empty(sides.shape, complex)
+    per, found = 1 / (2 * _areas_of(sides)), np.empty(sides.shape, complex)
     for k, (across, along) in enumerate(((-y, x - side), (y, -x), (0.0, side))):
         found.real[:, k], found.imag[:, k] = across * per, along * per
     return found

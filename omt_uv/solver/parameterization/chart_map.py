@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
-from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, positive_density
+from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, positive_density, without_room
 from ..freed_memory import give_back_of
 from ..maps.contacts import touches_itself
 from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
@@ -57,7 +57,6 @@ VANISHED = 50.0
 UNROLLED = 1e-4
 # Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
 NO_ROOM = 1e-7
-PARTED = "parts that single edges cut off take more than all of a circle"
 NOWHERE = np.zeros((0, 2))  # coordinates of no vertices
 # What is said, after their number, of faces of a map that is returned all the same.
 FOLDED = "faces are folded or without area in the map"
@@ -311,11 +310,11 @@ def _disk_mesh(
         text = f"A chart with only three boundary vertices does not fill a {boundary}; its boundary is free"
         log.warnings.append(text)
         boundary = "free"
-    if boundary != "free" and options.kind == "authalic" and options.balance == 0:
-        arcs, _ = arcs_of_parts(disk.triangles, loop, area)
-        if arcs.sum() > 1:
-            log.warnings.append(f"The {boundary} has no room for this chart ({PARTED}); its boundary is free instead")
-            boundary = "free"
+    exact = boundary != "free" and options.kind == "authalic" and options.balance == 0
+    if exact and arcs_of_parts(disk.triangles, loop, area)[0].sum() > 1:
+        why = "parts that single edges cut off take more than all of a circle"
+        log.warnings.append(without_room(boundary, why))
+        boundary = "free"
     corners, aspect = None, 1.0
     if boundary in RECTANGLES:
         from ..canonical.rectangles import natural_aspect, rectangle_corners
@@ -384,7 +383,7 @@ def _refined(
         if domain == "free":
             raise type(error)(error.cause, ANOTHER_SEAM, error.kind, error.elements) from error
         cause = error.cause
-    log.warnings.append(f"The {domain} has no room for this chart ({cause}); its boundary is free instead")
+    log.warnings.append(without_room(domain, cause))
     uv = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())
     free = RefinementOptions(balance=options.balance, quality=options.quality)
     return (yield from refine(disk.vertices, disk.triangles, uv, free, **given))

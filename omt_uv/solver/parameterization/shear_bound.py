@@ -222,8 +222,8 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
 def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound with shorter cuts, where searches had asked for more than maps needed, if these keep
     the bound, too; as it is otherwise."""
-    longer = [k for k in range(len(last.charts)) if last.has_slack(k)]
-    if not longer or not (longer := search.with_images(last.charts, longer)):
+    longer = search.with_images(last.charts, [k for k in range(len(last.charts)) if last.has_slack(k)])
+    if not longer:
         return last
     kept = last.kept(longer)
 
@@ -272,8 +272,9 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
 def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound with cuts that turn less, where their charts keep it, too: among the sides of quads many
     ways are as short as each other, and most of them go in steps."""
-    chosen = [k for k, chart in enumerate(last.charts) if len(chart.vertices) <= IN_STEPS and last.found_for(k)]
-    if not chosen or not (chosen := search.with_images(last.charts, chosen)):
+    small = [k for k, chart in enumerate(last.charts) if len(chart.vertices) <= IN_STEPS and last.found_for(k)]
+    chosen = search.with_images(last.charts, small)
+    if not chosen:
         return last
     changes = {"share": np.ones(search.count), "straighter": True, "stays_whole": True}
     differs = edge_set(last.cuts.edges)
@@ -281,10 +282,12 @@ def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd)
     new = yield from _cut_anew(search, last, asked, map_charts, early)
     if new is None or new is last:
         return last
+    from ..seams.growth import EVEN
+
     of, count = last.chart_of(search, new), len(last.charts)
-    # Another cut may come apart, along folds, or miss the bound.
+    # Another cut may come apart, along folds, or miss the bound; and of two alike rounding does not choose.
     good = (np.bincount(of, minlength=count) == 1) & (np.bincount(of, new.pressing > new.bound, count) == 0)
-    stay = ~(good & (np.bincount(of, new.outline_price, count) < last.outline_price))
+    stay = ~(good & (np.bincount(of, new.outline_price, count) < (1 - EVEN) * last.outline_price))
     return last if stay.all() else last.merged(search, new, of, stay)
 
 

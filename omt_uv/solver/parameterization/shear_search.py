@@ -13,14 +13,14 @@ import numpy as np
 
 from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
-from ..analysis.straight_paths import TURN
+from ..analysis.straight_paths import closed_price
 from ..analysis.symmetry_plane import MirrorImages
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
-from ..mesh.geometry import edge_lengths, unit
+from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
-from ..mesh.topology import boundary_edges, pair_keys
+from ..mesh.topology import boundary_edges, boundary_loops, pair_keys
 from ..progress import Steps, part_of
 from .chart_indices import all_within, but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
@@ -152,6 +152,8 @@ class ShearSearch:
     def with_images(self, charts: list[Chart], chosen: list[int]) -> list[int]:
         """The numbers of the chosen charts, with those of their mirror images: of two, the first is searched for both,
         and neither where that one is not chosen."""
+        if not chosen:
+            return []
         twin = self._twins(charts)
         one = {k for k in chosen if twin[k] < 0}
         return [k for k in range(len(charts)) if k in one or int(twin[k]) in one]
@@ -322,16 +324,10 @@ class Round:
 
     @property
     def outline_price(self) -> np.ndarray:
-        """The same (k,) with a price on turns, see `straight_paths`."""
-        prices = []
-        for chart in self.charts:
-            tail, head = boundary_edges(chart.triangles).T
-            along = chart.vertices[head] - chart.vertices[tail]
-            onwards = np.argsort(tail)[np.searchsorted(np.sort(tail), head)]
-            length, direction = np.linalg.norm(along, axis=1), unit(along)
-            bend = 1 - (direction * direction[onwards]).sum(axis=1)
-            prices.append(float((length + TURN * bend * (length + length[onwards]) / 2).sum()))
-        return np.array(prices)
+        """The same (k,) with a price on turns, see `straight_paths.closed_price`."""
+        return np.array(
+            [sum(closed_price(c.vertices, loop) for loop in boundary_loops(c.triangles)) for c in self.charts]
+        )
 
     def settled_where_searched(self) -> Round:
         """The same, where charts that miss the bound keep what was cut of them and are cut further: a search of one by

@@ -16,7 +16,7 @@ from ..cutting.cuts import Cuts
 from ..cutting.cuts import cut as cut_surface
 from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
-from ..errors import MeshError, plural
+from ..errors import MeshError, plural, without_room
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.surface import Surface
@@ -194,9 +194,7 @@ def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Su
     for k, chart_map in zip(folded, found, strict=True):
         if chart_map.folds < maps[k].folds:
             stay = plural(maps[k].folds, "1 face stays", "{} faces stay")
-            text = (
-                f"The {task.options.boundary} has no room for this chart ({stay} folded); its boundary is free instead"
-            )
+            text = without_room(task.options.boundary, f"{stay} folded")
             new[k] = replace(chart_map, warnings=(*chart_map.warnings, text))
     return new
 

@@ -360,9 +360,8 @@ def minimise(
         gained = step.share, value - step.energy, step.decrement
         pressure, twice, kept = float(next_pressure(used, *gained)), kept, bool(has_kept(*gained))
         w, value, steps = step.w, step.energy, steps + 1
-        left = float(left_over(value, *gained, before=residual)) if limits.expecting else np.inf
-        residual = float(promised(step.decrement, value))
-        left = min(left, residual)
+        before, residual = residual, float(promised(step.decrement, value))
+        left = float(left_over(value, *gained, before)) if limits.expecting else residual
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
         met = value < limits.relaxed or (limits.passing and kept and residual < PASSED)

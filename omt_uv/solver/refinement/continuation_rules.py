@@ -222,7 +222,7 @@ def left_over(energy: Number, share: Number, gain: Number, decrement: Number, be
     same share each, as from a map that is sheared all over, the next one does, too.
     """
     missed, residual = 1 - gain / np.maximum(decrement, NO_ENERGY), promised(decrement, energy)
-    expected = np.clip(np.maximum(BENT * np.square(missed), residual / before), LEFT, 1)
+    expected = np.clip(np.maximum(BENT * np.square(missed), residual / np.maximum(before, NO_ENERGY)), LEFT, 1)
     return residual * np.where((share == 1) & (energy < EASY), expected, 1)
 
 

@@ -344,7 +344,7 @@ def test_hat_gradients_are_the_slopes_of_hats_and_slivers_have_finite_ones():
         hats = np.linalg.inv(flat)[:2].T @ [1, 1j]
         np.testing.assert_allclose(gradient[t], hats)
     thin = np.array([[[0, 0, 0], [2, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [5, 0, 0]]], float)
-    area, gradient = geometry._hat_gradients(thin)
+    area, gradient = geometry.hat_gradients(thin.reshape(-1, 3), np.arange(6).reshape(2, 3))
     np.testing.assert_allclose(area, [0.5 * 2 * 2e-9, 0.5 * 1 * 5e-9])
     assert np.isfinite(gradient).all()
 

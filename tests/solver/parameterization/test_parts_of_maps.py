@@ -358,6 +358,7 @@ def test_the_price_of_an_outline_is_its_length_and_its_turns():
     [
         ([1.3, 1.2], [9, 9], [0, 1], [True, False]),
         ([1.3, 1.2], [9, 7], [0, 1], [True, True]),
+        ([1.3, 1.2], [9, 8 * (1 - 1e-9)], [0, 1], [True, False]),
         ([1.4, 1.2], [9, 7], [0, 1], [False, True]),
         ([1.4, 1.2], [9, 9], [0, 1], [False, False]),
         ([1.3, 1.2, 1.2], [4, 4, 7], [0, 0, 1], [False, True]),
@@ -409,14 +410,16 @@ def test_mirror_images_are_cut_anew_with_the_chart_that_is_searched(twin, chosen
 def test_nothing_is_straightened_that_no_search_has_found_or_is_large(monkeypatch):
     monkeypatch.setattr(shear_bound, "IN_STEPS", 4)
     large, small = (SimpleNamespace(vertices=np.zeros((n, 3))) for n in (5, 4))
+    search = SimpleNamespace(with_images=lambda charts, chosen: chosen)
     for chart, found in ((large, ["found"]), (small, [])):
         last = SimpleNamespace(charts=[chart], found_for=lambda k, found=found: found)
-        assert drain(shear_bound._straightened(None, last, None, EarlyEnd())) is last
+        assert drain(shear_bound._straightened(search, last, None, EarlyEnd())) is last
 
 
 def test_nothing_is_taken_back_where_nothing_has_slack():
     last = round_of([1], [1.1])
-    assert drain(shear_bound._taken_back(None, last, None, EarlyEnd())) is last
+    search = SimpleNamespace(with_images=lambda charts, chosen: chosen)
+    assert drain(shear_bound._taken_back(search, last, None, EarlyEnd())) is last
 
 
 def test_maps_of_pieces_shear_less_in_the_mean_by_area():
