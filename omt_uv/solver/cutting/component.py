@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from ..analysis.feature_edges import fold_angles
 from ..mesh.geometry import edge_lengths
 from ..mesh.gluing import Gluing, groups
-from ..mesh.topology import halfedges
+from ..mesh.topology import first_places, halfedges
 from .component_order import in_order
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
@@ -115,14 +115,14 @@ def classify(gluing: Gluing, corner_class: np.ndarray, component_of: np.ndarray,
     k = int(component_of.max()) + 1
     tail, head = halfedges(corner_class[gluing.triangles])
     boundary = _open_halfedges(len(tail), gluing.first, gluing.second)
-    vertices, where = np.unique(corner_class[gluing.triangles], return_index=True)
+    vertices, where = first_places(corner_class[gluing.triangles])
     n = np.bincount(component_of[where // 3], minlength=k)
     m = np.bincount(component_of, minlength=k)
     b = np.bincount(component_of[boundary // 3], minlength=k)
     a, z = np.searchsorted(vertices, tail[boundary]), np.searchsorted(vertices, head[boundary])
     graph = coo_matrix((np.ones(len(boundary)), (a, z)), shape=(len(vertices),) * 2)
     loop = connected_components(graph, directed=False)[1][a]
-    _, first = np.unique(loop, return_index=True)
+    first = first_places(loop)[1]
     boundaries = np.bincount(component_of[boundary[first] // 3], minlength=k)
     euler = n - (3 * m + b) // 2 + m
     sided = np.zeros(k, dtype=bool)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.order_of_places import lowest_first, order_of_places
-from ..mesh.topology import halfedges, pair_keys
+from ..mesh.topology import are_among, halfedges, pair_keys
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def in_order(points: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> Com
     rows = np.lexsort(triangles.T[::-1])
     triangles = triangles[rows]
     every = pair_keys(*halfedges(triangles))
-    inner = np.flatnonzero(np.isin(every, keys))
+    inner = np.flatnonzero(are_among(every, keys))
     return ComponentOrder(
         vertices=order,
         rows=rows,

@@ -9,7 +9,7 @@ import numpy as np
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
 from ..mesh.gluing import Gluing, components
 from ..mesh.surface import Surface, is_seam, is_sharp
-from ..mesh.topology import halfedges, pair_keys
+from ..mesh.topology import distinct, first_places, halfedges, pair_keys
 from .component import SEAM, SHARP
 
 
@@ -34,7 +34,7 @@ def total_curvature(gluing: Gluing, corner_class: np.ndarray, component_of: np.n
     boundary = np.unique(np.concatenate([tail[open_], head[open_]]))
     curvature = np.abs(angle_defects(classes, angles_from_lengths(length), boundary, n))
     curvature[boundary] = 0
-    vertices, where = np.unique(classes, return_index=True)
+    vertices, where = first_places(classes)
     return np.bincount(component_of[where // 3], curvature[vertices], int(component_of.max()) + 1)
 
 
@@ -77,14 +77,14 @@ def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarra
     pair_component = component_of[gluing.first // 3]
     lines = gluing.parallel() & one_sided[gluing.first // 3]
     apart = components(gluing.without(lines))
-    _, first = np.unique(apart, return_index=True)
+    first = first_places(apart)[1]
     parts = np.bincount(component_of[first], minlength=int(component_of.max()) + 1)
     return lines & (parts == 1)[pair_component]
 
 
 def in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
     """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
-    used = np.unique(gluing.vertex[gluing.triangles])
+    used = distinct(gluing.vertex[gluing.triangles])[0]
     p = surface.positions[used]
     low, high = p.min(axis=0), p.max(axis=0)
     # Halves first: the difference of two huge numbers may be infinite.

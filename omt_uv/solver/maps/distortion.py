@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
 from ..mesh.geometry import cross2, cross3, face_areas, lengths, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quads
-from ..mesh.topology import graph_components
+from ..mesh.topology import distinct, graph_components, halfedges, order_of_pairs, pair_keys
 from .energy import AT_ONCE
 from .overlap import overlap_share
 
@@ -192,8 +192,8 @@ def _counted(polygons: np.ndarray | None) -> np.ndarray | None:
     """Polygons (m,) counted from 0; None where each triangle is a polygon of its own."""
     if polygons is None:
         return None
-    found, counted = np.unique(polygons, return_inverse=True)
-    return None if len(found) == len(polygons) else counted.ravel()
+    found, counted = distinct(polygons)
+    return None if len(found) == len(polygons) else counted
 
 
 def _surface_area(V, F, polygons):
@@ -221,7 +221,7 @@ def _measure_faces(mesh: _Triangles, polygons) -> _FaceFigures:
     signed = np.where(mirrored, -uv_area, uv_area)
     if polygons is not None:
         del uv_area
-        counted = np.unique(polygons, return_inverse=True)[1].ravel().astype(np.int32)
+        counted = distinct(polygons)[1].astype(np.int32)
         return _measure_polygons(mesh, signed, mirrored, counted, charts)
     weight = mesh.target / mesh.target.sum()
     ratio = signed / max(np.abs(uv_area).sum(), np.finfo(float).tiny) / weight
@@ -323,11 +323,8 @@ def _shear_of(V, F, a, b):
 def uv_charts(F, uv):
     """Number of charts and chart (m,) of every face: faces are joined by edges with equal UVs at both ends."""
     T = F if _is_one_to_a_vertex(F, uv) else _welded_corners(F, uv)
-    i, j = T.ravel(), T[:, [1, 2, 0]].ravel()
-    edge = np.minimum(i, j) * F.size
-    edge += np.maximum(i, j)
-    del i, j
-    order = np.argsort(edge)
+    edge = pair_keys(*halfedges(T))
+    order = order_of_pairs(edge)
     edge = edge[order]
     same = edge[1:] == edge[:-1]
     del edge

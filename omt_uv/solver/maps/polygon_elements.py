@@ -15,6 +15,7 @@ import numpy as np
 
 from ..mesh.geometry import cross3, face_areas, hat_gradients, kept_hats, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
+from ..mesh.topology import distinct
 from .energy import AT_ONCE, Elements, Quads, elements, energies
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
@@ -99,7 +100,7 @@ def polygon_elements(
     faces : (m,) polygon of every triangle, None where each is its own
     region : (m,) in [0, 1]
     """
-    if faces is None or len(np.unique(faces)) == len(faces):
+    if faces is None or len(distinct(faces)[0]) == len(faces):
         return elements(positions, triangles, target, region)
     mesh = polygon_mesh(triangles, faces)
     every, polygon = mesh.every_triangle(), mesh.of_polygons()

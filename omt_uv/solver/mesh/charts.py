@@ -20,7 +20,7 @@ from ..errors import (
 )
 from .gluing import Gluing, components, corner_classes
 from .surface import Surface, strict_gluing
-from .topology import boundary_loops, graph_components, halfedges, order_of_pairs, pair_keys
+from .topology import boundary_loops, distinct, first_places, graph_components, halfedges, order_of_pairs, pair_keys
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,8 @@ def charts_of(surface: Surface, gluing: Gluing) -> list[Chart]:
     component = components(gluing)
     order = np.argsort(component, kind="stable")
     component, owner, corners = component[order], gluing.owner[order], gluing.triangles[order]
-    _, index, inverse = np.unique(corner_classes(gluing)[corners], return_index=True, return_inverse=True)
+    classes = corner_classes(gluing)[corners]
+    index, inverse = first_places(classes)[1], distinct(classes)[1]
     of_vertex = component[index // 3]
     by_chart = np.argsort(of_vertex, kind="stable")
     place = np.empty(len(by_chart), np.int64)

@@ -19,7 +19,7 @@ import numpy as np
 from .geometry import cross3, part_by_part
 from .polygon_areas import quads
 from .surface import Surface
-from .topology import next_halfedge, pair_keys, previous_halfedge
+from .topology import distinct, next_halfedge, pair_keys, previous_halfedge
 
 # Share of a quad's area that the triangle at each of its corners needs for the quad to be cut anew.
 LEAST_CORNER = 1e-3
@@ -141,8 +141,8 @@ def cut_along_shorter(surface: Surface) -> Surface:
     triangles, owner = surface.corner_vertex[surface.triangles], surface.triangle_face
     if not len(triangles):
         return surface
-    places = quads(triangles, np.unique(owner, return_inverse=True)[1].ravel())
-    used, given = np.unique(triangles.ravel()[places], return_inverse=True)
+    places = quads(triangles, distinct(owner)[1])
+    used, given = distinct(triangles.ravel()[places])
     points = surface.positions[used]
     if not len(used) or not np.isfinite(points).all():
         return surface

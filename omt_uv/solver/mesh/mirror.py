@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .topology import halfedges, pair_keys, pair_up, row_labels
+from .topology import distinct, halfedges, pair_keys, pair_up, row_labels
 
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
 MIRROR_TOLERANCE = 1e-4
@@ -127,7 +127,7 @@ class _Polygons:
     """
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None):
-        faces = np.arange(len(triangles)) if faces is None else np.unique(faces, return_inverse=True)[1]
+        faces = np.arange(len(triangles)) if faces is None else distinct(faces)[1]
         self.number = faces
         pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * len(positions) + triangles.ravel())
         self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
@@ -258,7 +258,7 @@ def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     triangles are symmetric, their diagonals are not. Where many triangles have no image there are no such pairs.
     """
     none = np.zeros((0, 2), np.int64)
-    used, compact = np.unique(triangles, return_inverse=True)
+    used, compact = distinct(triangles)
     if not len(used):
         return none
     triangles, points = compact.reshape(-1, 3), positions[used] / 2
@@ -332,7 +332,8 @@ def _candidates(positions: np.ndarray, triangles: np.ndarray) -> Iterator[np.nda
     used = np.zeros(len(points), bool)
     used[triangles] = True
     telling = np.flatnonzero(used & (distance > NEAR_CENTRE * distance.max()))
-    rings, count = np.unique(ring[telling], return_counts=True)
+    place = distinct(ring[telling])
+    rings, count = place[0], np.bincount(place[1])
     if not (count > 1).any():
         return
     chosen = telling[np.abs(ring[telling] - rings[np.where(count > 1, count, len(points) + 1).argmin()]) <= 1]

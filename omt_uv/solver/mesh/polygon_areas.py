@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .geometry import cross3, face_areas, part_by_part
+from .topology import distinct
 
 # Corners of a quad's four triangles: those of the diagonal given, then the others.
 BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
@@ -31,7 +32,7 @@ def polygon_areas(positions: np.ndarray, triangles: np.ndarray, polygons: np.nda
     area = face_areas(positions, triangles)
     if polygons is None:
         return area
-    owner = np.unique(polygons, return_inverse=True)[1].ravel()
+    owner = distinct(polygons)[1]
     given = np.bincount(owner, area)
     if len(given) == len(owner):
         return area

@@ -19,7 +19,7 @@ from ..errors import (
 )
 from .geometry import cross3, part_by_part
 from .gluing import Gluing, polygon_gluing
-from .topology import next_corners, pair_keys, pair_up, row_labels
+from .topology import are_among, distinct, next_corners, pair_keys, pair_up, row_labels
 
 # A triangle whose area is below this share of its longest side squared is a line.
 DEGENERATE = 1e-10
@@ -91,7 +91,7 @@ def chosen_triangles(surface: Surface, faces: np.ndarray | None) -> tuple[np.nda
 
 def check_finite(positions: np.ndarray, triangles: np.ndarray) -> None:
     """Raise NonFiniteError unless the vertices of triangles (m,3) are somewhere."""
-    used = np.unique(triangles)
+    used = distinct(triangles)[0]
     wrong = used[~np.isfinite(positions[used]).all(axis=1)]
     if len(wrong):
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
@@ -191,9 +191,9 @@ def with_joined_vertices(surface: Surface, same: np.ndarray) -> Surface:
 
 def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:
     """Whether edges, given by `topology.pair_keys` of their vertices, are seams; (k,) bool."""
-    return np.isin(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))
+    return are_among(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))
 
 
 def is_sharp(surface: Surface, key: np.ndarray) -> np.ndarray:
     """Whether edges, given by `topology.pair_keys` of their vertices, are marked sharp; (k,) bool."""
-    return np.isin(key, pair_keys(surface.sharp[:, 0], surface.sharp[:, 1]))
+    return are_among(key, pair_keys(surface.sharp[:, 0], surface.sharp[:, 1]))

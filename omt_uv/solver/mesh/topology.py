@@ -7,13 +7,15 @@ has twin -1 and is walked with the surface on its left.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 # Nodes of graphs whose components are found without a sparse matrix.
 FEW_NODES = 2000
 # Pairs up to which it takes longer to count than to compare them.
 FEW_PAIRS = 8000
+# So many times as many as there are integers the largest may be where they are counted.
+COUNTED = 4
 
 
 def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,6 +77,55 @@ def order_of_numbers(values: np.ndarray) -> np.ndarray:
     if len(values) > FEW_PAIRS and most < 2 * len(values):
         return _counted(values.astype(np.int32), most).astype(np.int64)
     return np.argsort(values, kind="stable")
+
+
+def distinct(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values (k,) that occur among integers of any shape, ascending, and the place of each one's, flat: those of
+    `np.unique`, by counting where none is large.
+
+    >>> distinct(np.array([[5, 2], [2, 7]]))
+    (array([2, 5, 7]), array([1, 0, 0, 2]))
+    """
+    flat = numbers.ravel()
+    most = _counted_up_to(flat)
+    if most is None:
+        values, place = np.unique(flat, return_inverse=True)
+        return values, place.ravel()
+    seen = np.zeros(most + 1, bool)
+    seen[flat] = True
+    return np.flatnonzero(seen).astype(flat.dtype, copy=False), (np.cumsum(seen) - 1)[flat]
+
+
+def first_places(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values (k,) that occur among integers of any shape, ascending, and where each does first, flat: those of
+    `np.unique`, by counting where none is large.
+
+    >>> first_places(np.array([5, 2, 2, 7]))
+    (array([2, 5, 7]), array([1, 0, 3]))
+    """
+    flat = numbers.ravel()
+    most = _counted_up_to(flat)
+    if most is None:
+        return np.unique(flat, return_index=True)
+    first = np.full(most + 1, -1)
+    # Of several that are written to one place the last one stays.
+    first[flat[::-1]] = np.arange(len(flat))[::-1]
+    values = np.flatnonzero(first >= 0)
+    return values.astype(flat.dtype, copy=False), first[values]
+
+
+def _counted_up_to(flat: np.ndarray) -> int | None:
+    """The largest of integers (k,) that take less long to count than to compare; None for others."""
+    most = int(flat.max(initial=-1))
+    return most if most <= COUNTED * len(flat) and int(flat.min(initial=0)) >= 0 else None
+
+
+def are_among(keys: np.ndarray, few: np.ndarray) -> np.ndarray:
+    """Which of the keys (k,) are among few others (f,), (k,) bool: `np.isin` sorts all of both."""
+    if not len(few) or not len(keys):
+        return np.zeros(len(keys), bool)
+    ordered = np.sort(few)
+    return ordered[np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)] == keys
 
 
 def runs(ordered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -183,7 +234,12 @@ def graph_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndar
     """Number of components of a graph of n nodes with the edges a, b (e,), and the component (n,) of every node."""
     if n <= FEW_NODES:
         return _few_components(np.asarray(a), np.asarray(b), n)
-    return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
+    # An edge that is there twice joins no more: its rows are counted, and nothing is sorted or summed.
+    edges, one, other = len(a), np.asarray(a, np.int32), np.asarray(b, np.int32)
+    rows = csr_matrix((np.zeros(edges, np.int8), one, np.arange(edges + 1, dtype=np.int32)), shape=(edges, n)).tocsc()
+    return connected_components(
+        csr_matrix((np.ones(edges), other[rows.indices], rows.indptr), shape=(n, n)), directed=False
+    )
 
 
 def _few_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndarray]:
@@ -200,15 +256,17 @@ def _few_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndarr
             if (further == root).all():
                 break
             root = further
-    first, label = np.unique(root, return_inverse=True)
-    return len(first), label.ravel()
+    first, label = distinct(root)
+    return len(first), label
 
 
 def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
     """Which of n vertices are at an edge that does not have two faces, (n,) bool, of any triangles (m,3)."""
     tail, head = halfedges(triangles)
-    _, index, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
-    open_edge = count[index.ravel()] != 2
+    keys = pair_keys(tail, head)
+    order = order_of_pairs(keys)
+    number, open_edge = runs(keys[order])[1], np.empty(len(keys), bool)
+    open_edge[order] = np.bincount(number)[number] != 2
     boundary = np.zeros(n, bool)
     boundary[tail[open_edge]] = boundary[head[open_edge]] = True
     return boundary

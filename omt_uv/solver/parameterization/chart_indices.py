@@ -13,7 +13,7 @@ from ..errors import MeshError, PinError
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart, triangle_rows
 from ..mesh.surface import Surface, is_seam
-from ..mesh.topology import boundary_edges, pair_keys
+from ..mesh.topology import boundary_edges, distinct, pair_keys
 from ..refinement.pins import Pins, aligned_to_pins, check_pins
 
 # Triangles beyond which the numbers of a chart take half of the memory.
@@ -48,7 +48,7 @@ def in_order_of_places(chart: Chart) -> tuple[Chart, np.ndarray]:
     place[order] = np.arange(len(order))
     triangles, turn = lowest_first(place[chart.triangles])
     corners = np.take_along_axis(chart.corners, turn, axis=1)
-    polygon = np.unique(chart.faces, return_inverse=True)[1].ravel()
+    polygon = distinct(chart.faces)[1]
     rows = np.lexsort((*triangles.T[::-1], *_polygon_keys(triangles, polygon)))
     patches = lowest_first(place[chart.patches])[0]
     # What is kept while a large chart is mapped takes half of the memory that it was found in.

@@ -22,7 +22,7 @@ from ..mesh.geometry import cross3, edge_lengths, signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads, partial_mirror
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
-from ..mesh.topology import boundary_loops, graph_components, on_boundary, pair_keys
+from ..mesh.topology import boundary_loops, distinct, graph_components, on_boundary, pair_keys
 from ..progress import Steps
 from ..refinement.initial_maps import is_curved, unroll
 from .chart_indices import ChartPins, identity
@@ -84,7 +84,7 @@ def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray)
     """
     none, n = np.zeros((0, 2), np.int64), len(surface.positions)
     _, triangles, owner = chosen_triangles(surface, faces)
-    used, compact = np.unique(surface.corner_vertex[triangles], return_inverse=True)
+    used, compact = distinct(surface.corner_vertex[triangles])
     place = np.full(n, -1)
     place[used] = np.arange(len(used))
     seams, cuts = (place[edges][(place[edges] >= 0).all(axis=1)] for edges in (surface.seams, cuts))

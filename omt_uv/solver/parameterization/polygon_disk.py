@@ -15,7 +15,7 @@ from ..mesh.charts import Chart
 from ..mesh.edge_flips import shorter_diagonals
 from ..mesh.geometry import cross2, cross3, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_fans
-from ..mesh.topology import boundary_loops
+from ..mesh.topology import boundary_loops, distinct
 
 # Triangles of a polygon that is cut by its ears, at most: that takes the square of them.
 MOST_TRIANGLES = 500
@@ -38,7 +38,7 @@ class PolygonDisk:
 
 def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     """The chart, with its vertices at (n,3), cut for its map."""
-    if len(np.unique(chart.faces)) == len(chart.faces):
+    if len(distinct(chart.faces)[0]) == len(chart.faces):
         # Triangles alone are there as they were.
         numbers = np.arange(len(chart.faces)), -1 - np.arange(len(chart.patches))
         return PolygonDisk(vertices, chart.disk, np.concatenate(numbers))

@@ -20,6 +20,7 @@ from ..errors import MeshError, plural, without_room
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.surface import Surface
+from ..mesh.topology import first_places
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import PROMISED, QUALITIES
 from .chart_indices import (
@@ -74,7 +75,7 @@ class SurfaceMap:
         """Corners of the surface (k,) that were mapped, each once, and their coordinates (k,2), charts unpacked."""
         corners = np.concatenate([c.corners.ravel() for c in self.charts])
         uv = np.concatenate([m.uv[c.triangles.ravel()] for c, m in zip(self.charts, self.maps, strict=True)])
-        corners, first = np.unique(corners, return_index=True)
+        corners, first = first_places(corners)
         return corners, uv[first]
 
     def report(self) -> list[dict]:

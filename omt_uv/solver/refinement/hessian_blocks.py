@@ -32,6 +32,7 @@ from ..maps.energy import (
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import in_turn, restricted
 from ..mesh.polygon_areas import BOTH
+from ..mesh.topology import order_of_numbers
 
 # Triangles whose blocks are found at a time: what is found on the way stays in the processor's cache.
 CHUNK = 8192
@@ -69,18 +70,16 @@ class Assembly:
         self.parts, self.order = parts, FillOrder()
         cells = [triangles] if quads is None or not len(quads) else [triangles, quads]
         # The diagonal, too: a vertex may follow another, and be in no cell.
-        pairs = [_pairs(c, n) for c in cells]
-        key = np.unique(np.concatenate([*pairs, np.arange(n, dtype=np.int64) * (n + 1)]))
+        column, row, number = _numbered_pairs([*cells, np.arange(n)[:, None]], n)
         # What is kept between steps takes half of the memory that it is computed in.
-        self._block = np.concatenate([np.searchsorted(key, k).astype(np.int32) for k in pairs])
-        column, row = np.divmod(key, n)
+        self._block = number[: len(number) - n]
         degree = np.bincount(column, minlength=n)
         start = np.cumsum(degree) - degree
         # Within column 2 j + q the rows 2 i + p follow each other; `stride` is from one of these columns to the next.
         self._stride = (2 * degree[column]).astype(np.int32)
-        self._slot = (4 * start[column] + 2 * (np.arange(len(key)) - start[column])).astype(np.int32)
+        self._slot = (4 * start[column] + 2 * (np.arange(len(column)) - start[column])).astype(np.int32)
         self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int32)
-        self._indices = np.empty(4 * len(key), np.int32)
+        self._indices = np.empty(4 * len(column), np.int32)
         for p, q in AXES:
             self._indices[self._slot + p + q * self._stride] = 2 * row + p
         self._every = self._every_slot(cells) if len(self._block) <= MOST_PAIRS else None
@@ -104,7 +103,8 @@ class Assembly:
         """Sum of the blocks (t,6,6) of triangles and (q,8,8) of quads, plus a diagonal (2n,)."""
         given = [blocks] if quads is None else [blocks, quads]
         if self._every is not None:
-            every = np.concatenate([b.transpose(1, 2, 0).ravel() for b in given])
+            several = [b.transpose(1, 2, 0).ravel() for b in given]
+            every = several[0] if len(several) == 1 else np.concatenate(several)
             data: np.ndarray = np.bincount(self._every, every, len(self._indices))
             return self._with_diagonal(data, diagonal)
         cells = [b.reshape(len(b), b.shape[1] // 2, 2, b.shape[1] // 2, 2) for b in given]
@@ -120,11 +120,18 @@ class Assembly:
 
     def _every_slot(self, cells: list[np.ndarray]) -> np.ndarray:
         """Where each entry of all blocks belongs: four times the memory of `_block`, and a third of the time."""
-        axis, parts = np.arange(2), np.split(self._block, np.cumsum([c.shape[1] * c.size for c in cells])[:-1])
-        of_cells = [b.reshape(-1, c.shape[1], 1, c.shape[1], 1) for b, c in zip(parts, cells, strict=True)]
-        return np.concatenate(
-            [np.moveaxis(self._slot[b] + axis[:, None, None] + self._stride[b] * axis, 0, -1).ravel() for b in of_cells]
-        )
+        parts, found = np.split(self._block, np.cumsum([c.shape[1] * c.size for c in cells])[:-1]), []
+        for block, cell in zip(parts, cells, strict=True):
+            m, k = cell.shape
+            where = np.empty((k, 2, k, 2, m), np.intp)
+            # Pair by pair: whole rows of entries are written one after the other.
+            for i, j in np.ndindex(k, k):
+                at = block.reshape(m, k * k)[:, i * k + j]
+                slot, stride = self._slot[at], self._stride[at]
+                for p, q in AXES:
+                    where[i, p, j, q] = slot + p + q * stride
+            found.append(where.ravel())
+        return np.concatenate(found)
 
     def _with_diagonal(self, data: np.ndarray, diagonal: np.ndarray) -> sp.csc_matrix:
         data[self._diagonal] += diagonal
@@ -181,10 +188,21 @@ class Hessian:
     scale: float
 
 
-def _pairs(cells: np.ndarray, n: int) -> np.ndarray:
-    """Keys (c k k,) of the pairs of corners of cells (c,k), row by row: column times n plus row of their block."""
-    k = cells.shape[1]
-    return (np.tile(cells, (1, k)).astype(np.int64) * n + np.repeat(cells, k, axis=1)).ravel()
+def _numbered_pairs(cells: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns (p,) and rows (p,) of the pairs of corners of cells (c,k), each once, column by column; and the number of
+    every pair of every cell, cell by cell and row by row of their blocks."""
+    several = [c.astype(np.int32, copy=False) for c in cells]
+    column = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in several])
+    row = np.concatenate([np.repeat(c, c.shape[1], axis=1).ravel() for c in several])
+    # By rows first, the columns then keep their order.
+    order = order_of_numbers(row)
+    order = order[order_of_numbers(column[order])].astype(np.int32)
+    column, row = column[order], row[order]
+    begins = np.ones(len(order), bool)
+    begins[1:] = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
+    number = np.empty(len(order), np.int32)
+    number[order] = np.cumsum(begins, dtype=np.int32) - 1
+    return column[begins], row[begins], number
 
 
 @overload
@@ -368,6 +386,8 @@ def _in_axes(blocks: np.ndarray, triangles: np.ndarray, frame, free, symmetry: M
     """Bring blocks (6,6,m) of triangles (m,3), in place, into the axes of their vertices, or of those these follow;
     these vertices (m,3)."""
     found = triangles if symmetry is None else symmetry.representative[triangles]
+    if symmetry is None and (frame == 1).all() and free.all():
+        return found
     plain = (frame[found] == 1) & free[found].all(axis=2)
     if symmetry is not None:
         plain &= ~symmetry.flip[triangles] & (symmetry.factor[triangles] == 1)
