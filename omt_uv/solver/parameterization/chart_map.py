@@ -28,6 +28,7 @@ from ..transport.convex_domain import Disk
 from .chart_indices import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
 from .initial_map import (
     COARSE_ABOVE,
+    DIRECT_WITH_ROOM,
     DRAFT_ABOVE,
     DRAFT_SPREAD,
     DiskMesh,
@@ -351,7 +352,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:
                 return even
-    if not draft:
+    if not draft and len(disk.vertices) <= DIRECT_WITH_ROOM:
         roomy = roomy_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log)
         if roomy is not None:
             return roomy
@@ -362,7 +363,9 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
                 return found
         except MeshError as error:
             log.warnings.append(f"{error.cause}; refined without a coarser mesh")
-    return (yield from direct_initial_map(disk, log))
+    # Of any size, where nothing coarser says more.
+    evened = None if disk.boundary == "free" else evened_initial_map(disk, log)
+    return (yield from direct_initial_map(disk, log)) if evened is None else evened
 
 
 def _refined(

@@ -153,6 +153,16 @@ class DiskMesh:
         return np.inf if self.flat is None else self.flat.spread(mass)
 
     @cached_property
+    def evened(self) -> np.ndarray | None:
+        """An embedding (n,2) in the domain by evened weights; None where that squeezes it."""
+        faces, outline = elements(self.vertices, self.triangles, self.target), (self.loop, self.corners, self.domain)
+        # A transport within a circle that vertices are going to leave is no better start.
+        most = np.inf if self.boundary == "disk" and is_crowded(self.triangles, self.loop, self.target) else SQUEEZED
+        with suppress(FoldedUVError, PrecisionError):
+            return evened_sites(faces, self.vertices, outline, SMOOTH_WEIGHT, most, lambda: True, self.order)
+        return None
+
+    @cached_property
     def bent(self) -> np.ndarray | None:
         """The flat disk (n,2), bent until it does not cover itself; None where double precision has no such map."""
         with suppress(PrecisionError):
@@ -343,17 +353,12 @@ def _energy(faces: Elements, uv: np.ndarray, area_weight: float) -> float:
 
 
 def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
-    """A disk of at most a middle size embedded in its domain by evened weights; None where that squeezes it. It
-    leaves as little to do as conformal map and transport, which take as long as all of the refinement."""
-    if len(disk.vertices) > DIRECT_WITH_ROOM or disk.is_far:
+    """A disk embedded in its domain by evened weights; None where that squeezes it. It leaves as little to do as
+    conformal map and transport, which take as long as all of the refinement."""
+    if disk.is_far:
         return None
-    faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
-    with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
-        # A transport within a circle that vertices are going to leave is no better start.
-        most = np.inf if disk.boundary == "disk" and is_crowded(disk.triangles, disk.loop, disk.target) else SQUEEZED
-        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, most, lambda: True, disk.order)
-        return None if evened is None else InitialChartMap(evened)
-    return None
+    with log.timed("embedding"):
+        return None if disk.evened is None else InitialChartMap(disk.evened)
 
 
 def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
