@@ -14,6 +14,7 @@ from ..mesh.geometry import (
     cross3,
     face_normals,
     halfedge_lengths,
+    lengths,
     vertex_normals,
 )
 from ..mesh.topology import halfedges, on_boundary, pair_keys, pair_up
@@ -49,7 +50,7 @@ def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     first, second = pair_up(pair_keys(*halfedges(triangles)))
     normal = face_normals(positions, triangles)
     a, b = normal[first // 3], normal[second // 3]
-    angle = np.arctan2(np.linalg.norm(cross3(a, b), axis=1), (a * b).sum(axis=1))
+    angle = np.arctan2(lengths(cross3(a, b)), (a * b).sum(axis=1))
     sharpest = np.zeros(len(positions))
     for ends in halfedges(triangles):
         np.maximum.at(sharpest, ends[first], angle)

@@ -19,7 +19,7 @@ def sharp_edges(positions: np.ndarray, triangles: np.ndarray, angle: float) -> n
     first, second, edges = _pairs(triangles)
     normal = face_normals(positions, triangles)
     a, b = normal[first // 3], normal[second // 3]
-    turn = np.arctan2(np.linalg.norm(cross3(a, b), axis=1), np.einsum("ej,ej->e", a, b))
+    turn = np.arctan2(lengths(cross3(a, b)), np.einsum("ej,ej->e", a, b))
     return edges[turn > angle]
 
 

@@ -21,6 +21,7 @@ from ..mesh.geometry import (
     angles_from_lengths,
     halfedge_lengths,
     laplacian_from_lengths,
+    lengths,
     vertex_areas,
 )
 
@@ -140,7 +141,7 @@ def boundary_first(
     factor = Factor(within, None if order is None else "natural") if len(inner) else None
     if factor is not None:
         log_scale[inner] = factor.solve(-curvature[inner])
-    side = np.linalg.norm(np.roll(vertices[loop], -1, axis=0) - vertices[loop], axis=1)
+    side = lengths(np.roll(vertices[loop], -1, axis=0) - vertices[loop])
     turn = curvature[loop] + laplacian[loop] @ log_scale
     system = HarmonicSystem(laplacian, factor, inner, order, loop, side, turn)
     return FlatDisk(system.inside_of(_closed_curve(side, turn)), log_scale, vertex_areas(vertices, triangles), system)

@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from ..errors import PrecisionError
 from ..linalg.sparse import solve_spd
 from ..maps.untangle import count_folds, untangle
-from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, halfedge_lengths, vertex_areas
+from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, halfedge_lengths, lengths, vertex_areas
 from ..mesh.topology import boundary_loops, halfedges
 from ..progress import Steps
 from .double_cover import crossed_segment, double_disk
@@ -67,7 +67,7 @@ def conformal_disk(vertices: np.ndarray, triangles: np.ndarray, tolerance: float
     result = yield from _rectangle(vertices, triangles, loop, quarter_points(vertices, loop), tolerance)
     disk = rectangle_to_disk(result.uv, result.aspect)
     disk = centre_in_disk(disk, vertex_areas(vertices, triangles))
-    disk[loop] /= np.linalg.norm(disk[loop], axis=1)[:, None]
+    disk[loop] /= lengths(disk[loop])[:, None]
     _check_resolution(disk, triangles)
     folds = count_folds(disk, triangles)
     if folds:
@@ -101,7 +101,7 @@ def conformal_rectangle(
 
 def quarter_points(vertices: np.ndarray, loop: np.ndarray) -> np.ndarray:
     """Four distinct vertices (4,) that cut the boundary into parts of about equal length."""
-    step = np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1)
+    step = lengths(vertices[np.roll(loop, -1)] - vertices[loop])
     start = np.cumsum(step) - step
     place = np.searchsorted(start, np.arange(4) / 4 * step.sum() - QUARTER_SLACK * step.sum())
     # Long edges may hold several quarters: push the later ones on, and none beyond the end of the loop.
@@ -120,7 +120,7 @@ def sharpest_corners(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarr
     if len(loop) <= 4:
         return loop
     turn, least = boundary_turns(vertices, triangles, loop), apart
-    step = np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1)
+    step = lengths(vertices[np.roll(loop, -1)] - vertices[loop])
     start, total = np.cumsum(step) - step, step.sum()
     chosen: list[int] = []
     far = np.full(len(loop), np.inf)

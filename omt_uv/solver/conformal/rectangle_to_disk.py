@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import PrecisionError
-from ..mesh.geometry import halfedge_lengths
+from ..mesh.geometry import halfedge_lengths, lengths
 
 # Longer side over shorter: the image of a longer rectangle has its ends squeezed below double precision.
 MAX_ASPECT = 8.0
@@ -73,5 +73,5 @@ def centred_sites(
     if np.linalg.norm(mass @ sites) < CENTRED * mass.sum():
         return sites
     centred = centre_in_disk(sites, mass)
-    centred[loop] /= np.linalg.norm(centred[loop], axis=1)[:, None]
+    centred[loop] /= lengths(centred[loop])[:, None]
     return centred if halfedge_lengths(centred, triangles).min() >= least else sites

@@ -13,7 +13,7 @@ import numpy as np
 from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
 from ..maps.overlap import cover_pairs, covered_share
-from ..mesh.geometry import cross3, face_areas, signed_areas
+from ..mesh.geometry import cross3, face_areas, lengths, signed_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
@@ -122,7 +122,7 @@ def cap_borders(component: CutComponent) -> np.ndarray:
     side = graph_components(joined[level, 0], joined[level, 1], count)[1]
     corners = component.positions[component.triangles]
     normal = cross3(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    area = np.bincount(side, np.linalg.norm(normal, axis=1))
+    area = np.bincount(side, lengths(normal))
     whole = np.linalg.norm([np.bincount(side, x) for x in normal.T], axis=0)
     pair = side[joined]
     border = pair[:, 0] != pair[:, 1]
@@ -198,7 +198,7 @@ def _ribbons(component: CutComponent, side: np.ndarray, border: np.ndarray) -> b
     tail, head = halfedges(component.triangles)
     ends = component.positions[np.stack([tail, head])[:, component.boundary]]
     outline = np.bincount(side[component.pair[border] // 3].ravel(), np.repeat(component.length[border], 2), count)
-    outline += np.bincount(side[component.boundary // 3], np.linalg.norm(ends[1] - ends[0], axis=1), count)
+    outline += np.bincount(side[component.boundary // 3], lengths(ends[1] - ends[0]), count)
     return bool(area[4 * np.pi * area < RIBBON * outline**2].sum() > HALF * area.sum())
 
 

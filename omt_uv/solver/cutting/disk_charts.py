@@ -16,7 +16,7 @@ from ..errors import (
     plural,
 )
 from ..mesh.charts import Chart, charts_of, check_disks
-from ..mesh.geometry import cross3
+from ..mesh.geometry import cross3, lengths
 from ..mesh.gluing import Gluing
 from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
@@ -121,7 +121,7 @@ def _all_lines(points: np.ndarray) -> bool:
     side = points / 2 - points[:, :1] / 2
     size = np.abs(side).max(axis=(1, 2), initial=0.0)
     side = side / np.where(size > 0, size, 1)[:, None, None]
-    return not (np.linalg.norm(cross3(side[:, 1], side[:, 2]), axis=1) > 0).any()
+    return not (lengths(cross3(side[:, 1], side[:, 2])) > 0).any()
 
 
 def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> DiskCharts:

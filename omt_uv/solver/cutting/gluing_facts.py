@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
+from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, lengths
 from ..mesh.gluing import Gluing, components
 from ..mesh.surface import Surface, is_seam, is_sharp
 from ..mesh.topology import distinct, first_places, halfedges, pair_keys
@@ -65,7 +65,7 @@ class TurningLines:
         """What the pairs `lines` (p,) bool do to components (m,) of the triangles, positions (n,3)."""
         a, b = gluing.ends(gluing.first[lines])
         component, count = component_of[gluing.first[lines] // 3], int(component_of.max()) + 1
-        length = np.bincount(component, np.linalg.norm(positions[a] - positions[b], axis=1), count)
+        length = np.bincount(component, lengths(positions[a] - positions[b]), count)
         return TurningLines(np.bincount(component, minlength=count) > 0, length)
 
 

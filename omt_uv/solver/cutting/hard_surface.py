@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import angles_from_lengths, halfedge_lengths
+from ..mesh.geometry import angles_from_lengths, halfedge_lengths, lengths
 from ..mesh.topology import graph_components
 from .component import CutComponent
 
@@ -60,7 +60,7 @@ def rounded_corners(component: CutComponent, curvature: np.ndarray, area: np.nda
     amount = np.maximum(np.bincount(patch[curved], weight[curved], component.vertex_count), 1e-30)
     moments = [np.bincount(patch[curved], (weight * x)[curved], component.vertex_count) for x in component.positions.T]
     middle = np.stack(moments, axis=1) / amount[:, None]
-    off = np.where(curved, np.linalg.norm(component.positions - middle[patch], axis=1), np.inf)
+    off = np.where(curved, lengths(component.positions - middle[patch]), np.inf)
     least = np.full(component.vertex_count, np.inf)
     np.minimum.at(least, patch[curved], off[curved])
     nearest = curved & (off <= AS_NEAR * least[patch]) & np.isin(patch, kept)

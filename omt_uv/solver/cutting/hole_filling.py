@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import plural
-from ..mesh.geometry import face_areas, face_normals
+from ..mesh.geometry import face_areas, face_normals, lengths
 from ..mesh.gluing import Gluing, components, corner_classes
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges
@@ -115,7 +115,7 @@ def _holes(
     `whole`."""
     a, b = gluing.ends(boundary)
     # Halves: the difference of two huge numbers may be infinite.
-    step = np.linalg.norm(positions[a] / 2 - positions[b] / 2, axis=1)
+    step = lengths(positions[a] / 2 - positions[b] / 2)
     around = np.bincount(loop, step)
     # Of many equal holes rounding shall not choose the one that stays open.
     length = around * (1 + NOISE * np.random.default_rng(0).random(len(around)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.geometry import as_points, complex_cross, signed_areas
+from ..mesh.geometry import as_points, complex_cross, lengths, signed_areas
 from ..mesh.topology import boundary_loops
 from .boxes import box_pairs
 
@@ -30,7 +30,7 @@ def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def touches_itself(uv: np.ndarray, loop: np.ndarray) -> bool:
     """Whether vertices of a boundary (b,) lie on one another in a map uv (n,2), as those along a slit do."""
     points = uv[loop]
-    step = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).mean()
+    step = lengths(points - np.roll(points, -1, axis=0)).mean()
     return bool((cKDTree(points).query(points, k=2)[0][:, 1] < TOUCHING * step).any())
 
 

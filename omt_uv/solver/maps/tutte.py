@@ -13,7 +13,7 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from ..errors import FoldedUVError, PrecisionError
 from ..linalg.nested_dissection import LARGE, mesh_order
 from ..linalg.sparse import Factor, solve_general
-from ..mesh.geometry import angles_from_lengths, halfedge_lengths
+from ..mesh.geometry import angles_from_lengths, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, halfedges, twins
 from .energy import Elements, energies_of, squared
 
@@ -251,6 +251,6 @@ def _weights(positions: np.ndarray, triangles: np.ndarray, equal: bool = False) 
 
 def arc_length_parameters(positions: np.ndarray, loop: np.ndarray) -> np.ndarray:
     """Share of the boundary's length before each vertex of the loop, (b,) in [0, 1); no two are at the same place."""
-    step = np.linalg.norm(positions[np.roll(loop, -1)] - positions[loop], axis=1)
+    step = lengths(positions[np.roll(loop, -1)] - positions[loop])
     step = np.maximum(step, LEAST_STEP * step.mean())
     return np.concatenate([[0.0], np.cumsum(step)[:-1]]) / step.sum()

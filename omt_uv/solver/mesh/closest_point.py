@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .geometry import face_normals
+from .geometry import face_normals, lengths
 from .topology import twins
 
 # Samples whose faces are tried for a query.
@@ -292,7 +292,7 @@ def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -
     A face is cut into k^2 similar ones, and their centroids are the points.
     """
     p = vertices[triangles]
-    longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=2).max(axis=1)
+    longest = lengths(p - p[:, [1, 2, 0]]).max(axis=1)
     level = np.maximum(np.ceil(longest / max(spacing, 1e-300)), 1)
     excess = np.sqrt((level**2).sum() / MOST_SAMPLES)
     if excess > 1:

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .geometry import cross3, part_by_part
+from .geometry import cross3, lengths, part_by_part
 from .polygon_areas import quads
 from .surface import Surface
 from .topology import distinct, next_halfedge, pair_keys, previous_halfedge
@@ -123,7 +123,7 @@ def _convex_and_longer(vertices: np.ndarray, quads: np.ndarray, rank: np.ndarray
     """Which quads (q,4) are convex, and of which the diagonal from the first corner is the longer one, (q,2) bool; of
     equal ones a corner of the least rank (n,) decides."""
     p = vertices[quads]
-    length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
+    length = lengths(p[:, [0, 1]] - p[:, [2, 3]])
     normal = cross3(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
     own = cross3(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     # A triangle next to a corner that is nearly straight is a sliver: if it was given, the map has to keep it open.

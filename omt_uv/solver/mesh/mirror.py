@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .geometry import lengths
 from .topology import distinct, halfedges, pair_keys, pair_up, row_labels
 
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
@@ -229,7 +230,7 @@ class _Polygons:
                 corners = self.first[some][:, None] + np.arange(own)
                 among = self.vertex[self.first[other[some]][:, None] + np.arange(theirs)]
                 place = _reflected(self.points[self.vertex[corners]], normal)
-                far = np.linalg.norm(place[:, :, None] - self.points[among][:, None], axis=3)
+                far = lengths(place[:, :, None] - self.points[among][:, None])
                 near = np.take_along_axis(among, far.argmin(axis=2), axis=1)
                 found[corners] = np.where(far.min(axis=2) <= MIRROR_TOLERANCE * self.extent, near, -1)
         corner = np.flatnonzero((used & ~few)[self.polygon])
@@ -325,7 +326,7 @@ def _candidates(positions: np.ndarray, triangles: np.ndarray) -> Iterator[np.nda
     points = positions - positions.mean(axis=0)
     principal = np.linalg.eigh(points.T @ points)[1].T
     yield from principal
-    distance = np.linalg.norm(points, axis=1)
+    distance = lengths(points)
     extent = float(np.ptp(positions, axis=0).max())
     step = SAME_DISTANCE * max(extent, float(np.finfo(float).tiny))
     ring = np.round(distance / step).astype(np.int64)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import cross3, face_areas, part_by_part
+from .geometry import cross3, face_areas, lengths, part_by_part
 from .topology import distinct
 
 # Corners of a quad's four triangles: those of the diagonal given, then the others.
@@ -72,7 +72,7 @@ def _alignment(points: np.ndarray) -> np.ndarray:
     one, two, three = (p[:, BOTH[:, k]] for k in range(3))
     normal = cross3(two - one, three - one)
     own = normal[:, :2].sum(axis=1)
-    size = np.linalg.norm(normal, axis=2) * np.linalg.norm(own, axis=1)[:, None]
+    size = lengths(normal) * lengths(own)[:, None]
     along = np.einsum("qtd,qd->qt", normal, own)
     return np.divide(along, size, out=np.ones_like(size), where=size > 0)
 
@@ -154,9 +154,9 @@ def polygon_fans(
     p, q, r, c = vertices[tail], vertices[head], vertices[head[after]], centre[index]
     fan = cross3(q - c, p - c) * -1
     normal = np.stack([np.bincount(index, fan[:, k]) for k in range(3)], axis=1)[index]
-    size = np.linalg.norm(normal, axis=1)
+    size = lengths(normal)
     ear = np.einsum("sd,sd->s", cross3(q - p, r - q), normal)
-    flat = ear < STRAIGHT * size * np.linalg.norm(q - p, axis=1) * np.linalg.norm(r - q, axis=1)
+    flat = ear < STRAIGHT * size * lengths(q - p) * lengths(r - q)
     sound[of_side[flat | (np.einsum("sd,sd->s", fan, normal) <= 0)]] = False
     kept = sound[of_side]
     chosen = np.unique(index[kept])
@@ -181,7 +181,7 @@ def _fans(positions, triangles, polygons, count: int) -> tuple[np.ndarray, np.nd
     double = cross3(positions[tail] - centre[of], positions[head] - centre[of])
     normal = _sums(of, double, count)
     backward = np.bincount(of, np.einsum("ij,ij->i", double, normal[of]) < 0, count)
-    return np.bincount(of, np.linalg.norm(double, axis=1) / 2, count), (sides > 2) & (backward == 0)
+    return np.bincount(of, lengths(double) / 2, count), (sides > 2) & (backward == 0)
 
 
 def _sums(rows: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
-from .geometry import cross3, edge_lengths, places
+from .geometry import cross3, edge_lengths, lengths, places
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam, side_ends
 from .topology import (
@@ -272,8 +272,8 @@ def _least_height(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     bad = degenerate_triangles(vertices, triangles, THIN)
     bad = degenerate_triangles(vertices, triangles, NEEDLE) if bad.all() else bad
     p = vertices[triangles]
-    double_area = np.linalg.norm(cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=2).max(axis=1)
+    double_area = lengths(cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
+    longest = lengths(p - p[:, [1, 2, 0]]).max(axis=1)
     height = np.where(bad, np.inf, double_area / np.where(longest > 0, longest, 1))
     reach = np.full(len(vertices), np.inf)
     np.minimum.at(reach, triangles.ravel(), np.repeat(height, 3))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import cross3
+from .geometry import cross3, lengths
 
 
 def normalized(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors (n,3) in the direction of vectors (n,3); zero stays zero."""
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    size = lengths(vectors)[..., None]
     return vectors / np.where(size > 0, size, 1)
 
 

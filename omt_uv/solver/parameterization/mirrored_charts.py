@@ -18,7 +18,7 @@ from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import MeshError
 from ..mesh.charts import Chart, sound_disks
-from ..mesh.geometry import cross3, edge_lengths, signed_areas
+from ..mesh.geometry import cross3, edge_lengths, lengths, signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads, partial_mirror
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
@@ -167,10 +167,10 @@ def motion_between(first: Chart, other: Chart) -> tuple[np.ndarray, float] | Non
     # Squares of huge coordinates would be infinite.
     unit = float(max(np.abs(first.vertices).max(), np.abs(other.vertices).max())) or 1.0
     (a, sides_a), (b, sides_b) = _about_centre(first, unit), _about_centre(other, unit)
-    size = np.linalg.norm(a[:, :3], axis=1).max()
+    size = lengths(a[:, :3]).max()
     if not size > 0:
         return None
-    far = [np.sort(np.linalg.norm(x[:, :3], axis=1)) for x in (a, b)]
+    far = [np.sort(lengths(x[:, :3])) for x in (a, b)]
     if len(sides_a) != len(sides_b) or np.abs(far[0] - far[1]).max() > SAME_PLACE * size:
         return None
     there = cKDTree(b / size)
@@ -213,8 +213,7 @@ def _beginnings(a, sides_a, b, sides_b, size: float) -> tuple[np.ndarray, list[t
 
     def figures(x, sides):
         p, q = x[sides[:, 0], :3], x[sides[:, 1], :3]
-        lengths = (np.linalg.norm(v, axis=1) for v in (p, q, p - q, cross3(p, q) / size))
-        return np.column_stack([*lengths]) / size
+        return np.column_stack([lengths(v) for v in (p, q, p - q, cross3(p, q) / size)]) / size
 
     mine, theirs = figures(a, sides_a), figures(b, sides_b)
     # A frame needs a side that does not point to the centre.

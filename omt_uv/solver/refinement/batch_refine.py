@@ -20,7 +20,7 @@ from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..maps.polygon_elements import polygon_elements, restricted, with_convex_quads
 from ..maps.tutte import tutte
-from ..mesh.geometry import angle_defects, angles_from_lengths, cross3, halfedge_lengths, signed_areas
+from ..mesh.geometry import angle_defects, angles_from_lengths, cross3, halfedge_lengths, lengths, signed_areas
 from ..mesh.topology import vertices_along_boundary
 from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
@@ -121,7 +121,7 @@ def refine_batch(
     """
     yield Progress("Small charts", 0.0)
     union = _union(meshes, polygons)
-    area = 0.5 * np.linalg.norm(_normals(union), axis=1)
+    area = 0.5 * lengths(_normals(union))
     target = area if density is None else area * density
     target = target * (union.sums(area) / union.sums(target))[union.of_face]
     w = _initial_maps(union, area)
@@ -201,7 +201,7 @@ def _initial_maps(union: MeshUnion, area: np.ndarray) -> np.ndarray:
     """Every chart with its area, (n,) complex: its mean value map with a circle as the boundary, or unrolled."""
     loop = union.boundary[:, 0]
     ends = np.flatnonzero(union.of_boundary[1:] != union.of_boundary[:-1]) + 1
-    step = np.linalg.norm(union.positions[union.boundary[:, 1]] - union.positions[loop], axis=1)
+    step = lengths(union.positions[union.boundary[:, 1]] - union.positions[loop])
     whole, before = np.bincount(union.of_boundary, step, union.count), np.cumsum(step) - step
     began = before[np.r_[0, ends]]
     turn = 2 * np.pi * (before - began[union.of_boundary]) / whole[union.of_boundary]

@@ -82,7 +82,7 @@ def is_far(target: np.ndarray, area: np.ndarray) -> bool:
 def disk_initial_map(vertices, triangles, uv, loop) -> InitialMap:
     """Boundary on the circle about 0 that has the area of the surface."""
     radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
-    uv = uv * (radius / np.linalg.norm(uv[loop], axis=1).mean())
+    uv = uv * (radius / lengths(uv[loop]).mean())
     motion, places = CircleMotion(loop, radius, len(vertices)), circle_boundary(uv, loop, radius)
     # Vertices that nearly coincide on the outline fold what is between them, and are spread, too.
     with contextlib.suppress(FoldedUVError):
@@ -109,7 +109,7 @@ def notched_disk(start: InitialMap, triangles, loop) -> InitialMap | None:
     released = released_vertices(triangles, loop, everywhere, everywhere > 0, len(start.uv))
     if not released.any():
         return None
-    radius = float(np.linalg.norm(start.uv[loop], axis=1).mean())
+    radius = float(lengths(start.uv[loop]).mean())
     motion = CircleMotion(loop[~released], radius, len(start.uv))
     warning = f"{released.sum()} boundary vertices leave the circle, where it has no room for their faces"
     return InitialMap(
@@ -264,7 +264,7 @@ def farthest_from_first(vertices: np.ndarray, boundary: np.ndarray, owner: np.nd
     begin = np.searchsorted(owner, np.unique(owner))
     chart = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(owner))))
     tail = boundary[:, 0]
-    far = np.linalg.norm(vertices[tail] - vertices[tail[begin]][chart], axis=1)
+    far = lengths(vertices[tail] - vertices[tail[begin]][chart])
     # On a symmetric boundary rounding shall not decide between two.
     good = np.flatnonzero(far >= FARTHEST * np.maximum.reduceat(far, begin)[chart])
     return tail[begin], tail[good[np.unique(chart[good], return_index=True)[1]]]
@@ -282,7 +282,7 @@ def least_squares_conformal(vertices, triangles, first: np.ndarray, second: np.n
     linear = linear_forms(np.vstack([triangles, triangles]), np.vstack([rows, -1j * rows]), n).tocsc()
     fixed = np.concatenate([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
     x = np.zeros(2 * n)
-    x[2 * second] = np.linalg.norm(vertices[second] - vertices[first], axis=1)
+    x[2 * second] = lengths(vertices[second] - vertices[first])
     others = np.setdiff1d(np.arange(2 * n), fixed)
     free = linear[:, others]
     factor = Factor(free.T @ free)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.energy import Elements, elements
-from ..mesh.geometry import complex_cross, cross2, cross3, dot2, face_areas
+from ..mesh.geometry import complex_cross, cross2, cross3, dot2, face_areas, lengths
 from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
@@ -277,7 +277,7 @@ def _places(V, flat, vertex, row, new, ahead, normal):
     back[ahead[boundary]] = boundary
     on_boundary = np.flatnonzero(ahead[vertex] >= 0)
     v = vertex[on_boundary]
-    forth, past = (np.linalg.norm(V[v] - V[x[v]], axis=1) for x in (ahead, back))
+    forth, past = (lengths(V[v] - V[x[v]]) for x in (ahead, back))
     part = past / np.maximum(forth + past, 1e-300)
     corner[on_boundary] = np.column_stack([ahead[v], back[v], back[v]])
     share[on_boundary] = np.column_stack([part, 1 - part, np.zeros(len(v))])

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..errors import CoarseningError
-from ..mesh.geometry import cross3, face_areas
+from ..mesh.geometry import cross3, face_areas, lengths
 from ..mesh.topology import halfedges, next_halfedge
 
 # A level ends when this share of its vertices is left.
@@ -111,7 +111,7 @@ def _choose(vertices, triangles, rng) -> tuple[np.ndarray, np.ndarray]:
     common = (adjacent @ adjacent).multiply(adjacent).tocsr()
     allowed = np.asarray(common[tail, head]).ravel() == 2
     degree = np.bincount(tail, minlength=n)
-    length = np.linalg.norm(vertices[tail] - vertices[head], axis=1)
+    length = lengths(vertices[tail] - vertices[head])
     price = length * (1 + np.maximum(degree[tail] + degree[head] - 4 - HIGH_DEGREE, 0))
     order = np.lexsort((head, price, ~allowed, tail))
     first = order[np.searchsorted(tail[order], np.flatnonzero(degree > 0))]
@@ -155,7 +155,7 @@ def _worst_shape(vertices, triangles, parent) -> np.ndarray:
 
 def _shape(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
     """Shape (k,) of triangles, 4 sqrt(3) area / (sum of the squared sides): 1 equilateral, 0 without area."""
-    area = np.linalg.norm(cross3(q - p, r - p), axis=1)
+    area = lengths(cross3(q - p, r - p))
     squares = ((q - p) ** 2).sum(axis=1) + ((r - q) ** 2).sum(axis=1) + ((p - r) ** 2).sum(axis=1)
     return 2 * np.sqrt(3) * area / np.maximum(squares, 1e-300)
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ..maps.distortion import shear_of
-from ..mesh.geometry import cross3, face_areas
+from ..mesh.geometry import cross3, face_areas, lengths
 from ..mesh.spherical_geometry import spherical_areas
 
 
@@ -47,8 +47,8 @@ def sphere_figures(vertices: np.ndarray, triangles: np.ndarray, positions: np.nd
     ratio = on_sphere / on_sphere.sum() / np.maximum(share, np.finfo(float).tiny)
     corner = positions[triangles]
     side, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    base = np.maximum(np.linalg.norm(side, axis=1), np.finfo(float).tiny)
-    along, up = np.einsum("md,md->m", side, other) / base, np.linalg.norm(cross3(side, other), axis=1) / base
+    base = np.maximum(lengths(side), np.finfo(float).tiny)
+    along, up = np.einsum("md,md->m", side, other) / base, lengths(cross3(side, other)) / base
     shear = shear_of(vertices, triangles, np.column_stack([base, 0 * base]), np.column_stack([along, up]))
     real = (surface > 0) & (ratio > 0) & np.isfinite(shear)
     return SphereFigures(

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.sparse import solve_spd
-from ..mesh.geometry import cross3
+from ..mesh.geometry import cross3, lengths
 from ..mesh.spherical_geometry import spherical_areas
 from ..mesh.topology import next_halfedge, previous_halfedge, twins
 from ..progress import Progress, Steps
@@ -68,7 +68,7 @@ def moser_map(points: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> St
     share = _mean_value_weights(points, triangles, _on_sphere(points, triangles, start, cell))
     images = share[:, None] * _on_sphere(points, triangles, face, weights)
     positions = np.stack([np.bincount(triangles.ravel(), c, len(points)) for c in images.T], axis=1)
-    positions = positions / np.linalg.norm(positions, axis=1, keepdims=True)
+    positions = positions / lengths(positions)[..., None]
     status = "points left on the way" if stuck else "converged"
     return MoserMap(positions=positions, crossings=rounds, stuck=stuck, status=status)
 
@@ -79,7 +79,7 @@ def _corner_samples(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     So two that follow each other around a vertex are less than half a turn apart, and the vertex lies between them all.
     """
     p = points[triangles]
-    after = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2)
+    after = lengths(np.roll(p, -1, axis=1) - p)
     before = np.roll(after, 1, axis=1)
     m = len(triangles)
     cell = np.zeros((m, 3, 3))
@@ -93,7 +93,7 @@ def _corner_samples(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def _on_sphere(points: np.ndarray, triangles: np.ndarray, face: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Unit vectors (p,3) at barycentric coordinates (p,3) of faces (p,)."""
     x = np.einsum("pk,pkd->pd", weights, points[triangles[face]])
-    return x / np.linalg.norm(x, axis=1, keepdims=True)
+    return x / lengths(x)[..., None]
 
 
 def _mean_value_weights(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray) -> np.ndarray:
@@ -105,10 +105,10 @@ def _mean_value_weights(points: np.ndarray, triangles: np.ndarray, samples: np.n
     vertex = triangles.ravel()
     height = (samples * points[vertex]).sum(axis=1)
     spoke = samples / height[:, None] - points[vertex]
-    length = np.maximum(np.linalg.norm(spoke, axis=1), 1e-300)
+    length = np.maximum(lengths(spoke), 1e-300)
     # The corner that follows around the vertex lies across the side that ends in it.
     after = twins(triangles)[previous_halfedge(np.arange(len(vertex)))]
-    sine = np.linalg.norm(cross3(spoke, spoke[after]), axis=1)
+    sine = lengths(cross3(spoke, spoke[after]))
     half = sine / np.maximum(
         length * length[after] + (spoke * spoke[after]).sum(axis=1), 1e-12 * length * length[after]
     )
@@ -126,7 +126,7 @@ def edge_fluxes(points: np.ndarray, triangles: np.ndarray, gain: np.ndarray) -> 
     m = len(triangles)
     p = points[triangles]
     opposite = np.roll(p, -2, axis=1) - np.roll(p, -1, axis=1)
-    area = 0.5 * np.linalg.norm(cross3(opposite[:, 0], opposite[:, 1]), axis=1)
+    area = 0.5 * lengths(cross3(opposite[:, 0], opposite[:, 1]))
     # 4 <grad lambda_j, grad lambda_k> area = <e_j, e_k> / area.
     stiffness = np.einsum("mjd,mkd->mjk", opposite, opposite) / area[:, None, None]
     # The side opposite to corner k is halfedge k + 1.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import PrecisionError
-from ..mesh.geometry import cross3
+from ..mesh.geometry import cross3, lengths
 from ..mesh.spherical_geometry import normalized, signed_volumes, triple_products
 from ..progress import Progress, Steps
 from .coarsen import CollapseRound, SphereLevel, collapse_to_tetrahedron
@@ -119,7 +119,7 @@ def _best_places(step: CollapseRound, positions: np.ndarray) -> np.ndarray:
     np.add.at(bisector, step.owner[beside], normal[beside])
     middle, width = np.zeros((r, 3)), np.zeros(r)
     np.add.at(middle, step.owner, a)
-    np.maximum.at(width, step.owner, np.linalg.norm(a - parent[step.owner], axis=1))
+    np.maximum.at(width, step.owner, lengths(a - parent[step.owner]))
     best, found = np.full(r, -np.inf), parent.copy()
     for direction in (_tangent(middle, parent), _tangent(bisector, parent)):
         for share in TRIED_DISTANCES:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, FaceDerivatives, area_forms_of, derivatives_of, energy_of, squared
-from ..mesh.geometry import cross3
+from ..mesh.geometry import cross3, lengths
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from ..refinement.hessian_blocks import Assembly, lone_triangles, long_forms, quad_blocks
 from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, NewtonStep, fold_shares
@@ -48,7 +48,8 @@ def project_faces(positions: np.ndarray, triangles: np.ndarray) -> ProjectedFace
     axes, corner, up, size = _projected(p)
     height = np.einsum("md,mkd->mk", up, p)
     mixing = np.eye(3) - (height / np.maximum(size, 1e-300))[:, :, None]
-    return ProjectedFaces(axes=axes, corner=corner, mixing=mixing, least_cosine=height.min(axis=1))
+    least = np.minimum(np.minimum(height[:, 0], height[:, 1]), height[:, 2])
+    return ProjectedFaces(axes=axes, corner=corner, mixing=mixing, least_cosine=least)
 
 
 def projected_corners(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -58,8 +59,8 @@ def projected_corners(positions: np.ndarray, triangles: np.ndarray) -> np.ndarra
 
 def _projected(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Axes (m,2,3), corners (m,3) complex in them, middles (m,3) and lengths (m,1) of the sums of corners (m,3,3)."""
-    total = p.sum(axis=1)
-    size = np.linalg.norm(total, axis=1, keepdims=True)
+    total = p[:, 0] + p[:, 1] + p[:, 2]
+    size = lengths(total)[..., None]
     up = total / np.maximum(size, 1e-300)
     side = p[:, 1] - p[:, 0]
     first = normalized(side - np.einsum("md,md->m", side, up)[:, None] * up)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import as_complex, as_points, cross3
+from ..mesh.geometry import as_complex, as_points, cross3, lengths
 from ..mesh.spherical_geometry import normalized
 from .convex_domain import ConvexPolygon, Domain
 from .regular_triangulation import by_hull, power_centres
@@ -74,7 +74,7 @@ def planar_cells(sites: np.ndarray, site_weights: np.ndarray, domain: Domain) ->
     edge = np.flatnonzero(dual.twin >= 0)
     edge = edge[dual.triangles.ravel()[edge] < n]
     p, q = as_points(centre[edge // 3]), as_points(centre[dual.twin[edge] // 3])
-    length = np.maximum(np.linalg.norm(q - p, axis=1), 1e-300)
+    length = np.maximum(lengths(q - p), 1e-300)
     way = (q - p) / length[:, None]
     enter, leave = domain.clip(p, way)
     begin, end = np.maximum(enter, 0), np.minimum(leave, length)
@@ -94,7 +94,7 @@ def spherical_cell_polygons(sites: np.ndarray, site_weights: np.ndarray, hull: H
     owner = hull.triangles.ravel()
     middle = normalized(_means(normal, owner, len(sites)))
     x = cross3(middle, np.eye(3)[np.abs(middle).argmin(axis=1)])
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    x /= lengths(x)[..., None]
     y = cross3(middle, x)
     angle = np.arctan2((normal * y[owner]).sum(axis=1), (normal * x[owner]).sum(axis=1))
     order = np.lexsort((angle, owner))
@@ -127,5 +127,5 @@ def _sorted(points: np.ndarray, owner: np.ndarray, middle: np.ndarray, same: flo
     before = np.arange(len(points)) - 1
     first = start[:-1][np.diff(start) > 0]
     before[first] = start[1:][np.diff(start) > 0] - 1
-    apart = np.linalg.norm(points - points[before], axis=1) > same
+    apart = lengths(points - points[before]) > same
     return CellPolygons(points[apart], _starts(owner[apart], len(middle)))

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..mesh.geometry import cross2, dot2
+from ..mesh.geometry import cross2, dot2, lengths
 
 
 def segment_integrals(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ class ConvexPolygon:
         middle = (corners + np.roll(corners, -1, axis=0)) / 3
         self.corners = corners - (twice[:, None] * middle).sum(axis=0) / twice.sum()
         self.area = float(twice.sum() / 2)
-        self.length = np.linalg.norm(side, axis=1)
+        self.length = lengths(side)
         self.tangent = side / self.length[:, None]
         self.normal = np.stack([self.tangent[:, 1], -self.tangent[:, 0]], axis=1)
         self.start = np.concatenate([[0.0], np.cumsum(self.length)])

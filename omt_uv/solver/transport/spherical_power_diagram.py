@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import TransportError
 from ..mesh.edge_flips import flip_in_place, flip_until_none
-from ..mesh.geometry import cross3
+from ..mesh.geometry import cross3, lengths
 from ..mesh.spherical_geometry import normalized, triangle_areas, triple_products
 from ..mesh.topology import halfedges, previous_halfedge, twins
 
@@ -69,7 +69,7 @@ def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> 
     n = len(sites)
     middle = normalized(_sum(tail, after, n))
     area = np.bincount(tail, triangle_areas(middle[tail], before, after), n)
-    apart, along = np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1)
+    apart, along = lengths(after - before), lengths(after + before)
     arc = 2 * np.arctan2(apart, along)
     moment = _sum(tail, 0.5 * arc[:, None] * normalized(cross3(before, after - before)), n)
     once = np.arange(len(tail)) < hull.twin
@@ -77,7 +77,7 @@ def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> 
     radial, across = _from(sites, site_weights, i, j)
     # The integral of x along an arc is tan(arc / 2) times the sum of its ends; lengths are in units of exp(h_i).
     integral = np.einsum("md,md->m", (before + after)[once], sites[i]) * apart[once] / along[once]
-    conductance = np.maximum(integral, 0) / np.hypot(radial, np.linalg.norm(across, axis=1))
+    conductance = np.maximum(integral, 0) / np.hypot(radial, lengths(across))
     return SphericalCells(area=area, moment=moment, edges=np.stack([i, j], axis=1), conductance=conductance, hull=hull)
 
 
