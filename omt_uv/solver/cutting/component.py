@@ -11,7 +11,14 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..analysis.feature_edges import fold_angles
-from ..mesh.geometry import edge_lengths
+from ..mesh.geometry import (
+    LEAST_STIFFNESS,
+    angle_defects,
+    angles_from_lengths,
+    edge_lengths,
+    halfedge_lengths,
+    laplacian_from_lengths,
+)
 from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import first_places, halfedges
 from .component_order import in_order
@@ -77,6 +84,18 @@ class CutComponent:
     def graph(self) -> csr_matrix:
         """The cost of all inner edges as `edge_graph` gives it; a cut asks for it again and again."""
         return edge_graph(self, np.arange(len(self.pair)), self.ends, self.vertex_count)
+
+    @cached_property
+    def laplacian(self) -> csr_matrix:
+        """The Laplacian (n,n) of the surface without cuts: inside of any cut it is that of what is cut open."""
+        length = halfedge_lengths(self.positions, self.triangles).reshape(-1, 3)
+        return laplacian_from_lengths(length, self.triangles, self.vertex_count, LEAST_STIFFNESS)
+
+    @cached_property
+    def curvature(self) -> np.ndarray:
+        """Angle defects (n,) of the surface without cuts."""
+        angles = angles_from_lengths(halfedge_lengths(self.positions, self.triangles).reshape(-1, 3))
+        return angle_defects(self.triangles, angles, np.flatnonzero(self.on_boundary()), self.vertex_count)
 
     def tip_factor(self) -> np.ndarray:
         """Factor (n,) > 0 by which a cut would rather end at a vertex: small where cuts are to be avoided."""

@@ -41,15 +41,13 @@ def log_scale(component: CutComponent, cut: np.ndarray) -> np.ndarray:
 
     On a closed surface without a cut its mean is 0, and it is largest at the sharpest extremity.
     """
-    metric = _Metric.of(component, cut)
-    curvature, fixed = metric.curvature, metric.on_boundary
+    # What a cut parts is held at 0 on either side: all that is solved for lies inside, as it was before the cut.
+    curvature, fixed = component.curvature, component.on_boundary()
+    fixed[component.ends[cut].ravel()] = True
     if not fixed.any():
         curvature = curvature - curvature.mean()
         fixed = np.arange(len(curvature)) == np.argmin(curvature)
-    u = metric.solved(curvature, fixed)
-    at_vertex = np.zeros(component.vertex_count)
-    np.maximum.at(at_vertex, component.triangles.ravel(), np.abs(u)[metric.classes.ravel()])
-    return at_vertex
+    return np.abs(_solved(component.laplacian, curvature, fixed))
 
 
 def outline_spread(component: CutComponent, cut: np.ndarray) -> float:
@@ -59,7 +57,7 @@ def outline_spread(component: CutComponent, cut: np.ndarray) -> float:
     n, area = len(metric.curvature), face_areas(component.positions, component.triangles)
     around = np.bincount(metric.ends.ravel(), np.repeat(metric.end_lengths, 2), n)
     curvature = metric.curvature - 2 * np.pi * around / around.sum()
-    u = metric.solved(curvature - curvature.mean(), np.arange(n) == 0)
+    u = _solved(metric.matrix, curvature - curvature.mean(), np.arange(n) == 0)
     share = np.bincount(metric.classes.ravel(), np.repeat(area, 3), n) / (3 * area.sum())
     return float(share @ (u - share @ u) ** 2)
 
@@ -82,12 +80,11 @@ def disk_spread(component: CutComponent, cut: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Metric:
-    """A component cut open: its vertices as classes (m,3), their curvature (n,) and whether they are on the boundary
-    (n,) bool, the boundary's edges by their ends (b,2) and how long they are (b,), and the Laplacian (n,n)."""
+    """A component cut open: its vertices as classes (m,3), their curvature (n,), the boundary's edges by their ends
+    (b,2) and how long they are (b,), and the Laplacian (n,n)."""
 
     classes: np.ndarray
     curvature: np.ndarray
-    on_boundary: np.ndarray
     ends: np.ndarray
     end_lengths: np.ndarray
     matrix: csr_matrix
@@ -104,17 +101,17 @@ class _Metric:
         return _Metric(
             classes=classes,
             curvature=angle_defects(classes, angles_from_lengths(sides), np.flatnonzero(open_there), n),
-            on_boundary=open_there,
             ends=ends,
             end_lengths=length[boundary],
             matrix=laplacian_from_lengths(sides, classes, n, LEAST_STIFFNESS),
         )
 
-    def solved(self, curvature: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-        """The log scale (n,) that flattens a curvature (n,), 0 where it is fixed (n,) bool."""
-        u = np.zeros(len(curvature))
-        u[~fixed] = solve_spd(self.matrix[~fixed][:, ~fixed].tocsc(), curvature[~fixed])
-        return u
+
+def _solved(laplacian: csr_matrix, curvature: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """The log scale (n,) that flattens a curvature (n,), 0 where it is fixed (n,) bool."""
+    u = np.zeros(len(curvature))
+    u[~fixed] = solve_spd(laplacian[~fixed][:, ~fixed].tocsc(), curvature[~fixed])
+    return u
 
 
 def spread(component: CutComponent, scale: np.ndarray) -> float:

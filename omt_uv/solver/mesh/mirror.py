@@ -223,8 +223,9 @@ class _Polygons:
         found = np.full(len(self.vertex), -1)
         sides = np.stack([self.sides, self.sides[other]])
         few = used & (sides.max(axis=0) <= FEW_SIDES)
+        both = distinct((sides[0] * (FEW_SIDES + 1) + sides[1])[few])[0]
         # Pairs of all their corners are compared faster than a tree of these is built.
-        for own, theirs in np.unique(sides[:, few], axis=1).T:
+        for own, theirs in zip(*np.divmod(both, FEW_SIDES + 1), strict=True):
             rows = np.flatnonzero(few & (sides[0] == own) & (sides[1] == theirs))
             for some in np.array_split(rows, len(rows) * own * theirs // AT_ONCE + 1):
                 corners = self.first[some][:, None] + np.arange(own)
