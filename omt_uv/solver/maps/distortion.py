@@ -168,12 +168,14 @@ def _checked(V, F, uv, polygons):
     polygons = None if polygons is None else np.asarray(polygons)
     if not len(F):
         raise EmptyMeshError("There are no faces to measure")
-    bad_vertex = np.flatnonzero(~np.isfinite(V).all(1))
-    bad_vertex = bad_vertex[np.isin(bad_vertex, F)]
-    if len(bad_vertex):
-        raise NonFiniteError("A position is not a finite number", "", "vertex", bad_vertex)
-    bad_face = _names(polygons, ~np.isfinite(uv).all((1, 2)))
-    if len(bad_face):
+    finite, mapped = np.isfinite(V), np.isfinite(uv)
+    if not finite.all():
+        bad_vertex = np.flatnonzero(~finite.all(1))
+        bad_vertex = bad_vertex[np.isin(bad_vertex, F)]
+        if len(bad_vertex):
+            raise NonFiniteError("A position is not a finite number", "", "vertex", bad_vertex)
+    if not mapped.all():
+        bad_face = _names(polygons, ~mapped.all((1, 2)))
         raise NonFiniteError("A UV is not a finite number", "Unwrap these faces anew first", "face", bad_face)
     return V, F, uv, polygons
 

@@ -28,7 +28,6 @@ from ..transport.convex_domain import Disk
 from .chart_indices import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
 from .initial_map import (
     COARSE_ABOVE,
-    DIRECT_WITH_ROOM,
     DRAFT_ABOVE,
     DRAFT_SPREAD,
     DiskMesh,
@@ -352,7 +351,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:
                 return even
-    if not draft and len(disk.vertices) <= DIRECT_WITH_ROOM:
+    if not draft:
         roomy = roomy_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log)
         if roomy is not None:
             return roomy
@@ -363,9 +362,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
                 return found
         except MeshError as error:
             log.warnings.append(f"{error.cause}; refined without a coarser mesh")
-    # Of any size, where nothing coarser says more.
-    evened = None if disk.boundary == "free" else evened_initial_map(disk, log)
-    return (yield from direct_initial_map(disk, log)) if evened is None else evened
+    return (yield from direct_initial_map(disk, log))
 
 
 def _refined(
@@ -443,7 +440,7 @@ def placed_chart(
 def _about_zero(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """A map (n,2) with its centroid moved to 0."""
     area = signed_areas(uv, triangles)
-    return uv - area @ uv[triangles].mean(axis=1) / area.sum()
+    return uv - area @ uv[triangles.T].mean(axis=0) / area.sum()
 
 
 def in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:

@@ -153,16 +153,6 @@ class DiskMesh:
         return np.inf if self.flat is None else self.flat.spread(mass)
 
     @cached_property
-    def evened(self) -> np.ndarray | None:
-        """An embedding (n,2) in the domain by evened weights; None where that squeezes it."""
-        faces, outline = elements(self.vertices, self.triangles, self.target), (self.loop, self.corners, self.domain)
-        # A transport within a circle that vertices are going to leave is no better start.
-        most = np.inf if self.boundary == "disk" and is_crowded(self.triangles, self.loop, self.target) else SQUEEZED
-        with suppress(FoldedUVError, PrecisionError):
-            return evened_sites(faces, self.vertices, outline, SMOOTH_WEIGHT, most, lambda: True, self.order)
-        return None
-
-    @cached_property
     def bent(self) -> np.ndarray | None:
         """The flat disk (n,2), bent until it does not cover itself; None where double precision has no such map."""
         with suppress(PrecisionError):
@@ -352,19 +342,24 @@ def _energy(faces: Elements, uv: np.ndarray, area_weight: float) -> float:
     return energy(faces, w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum()), area_weight)
 
 
-def evened_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
-    """A disk embedded in its domain by evened weights; None where that squeezes it. It leaves as little to do as
-    conformal map and transport, which take as long as all of the refinement."""
-    if disk.is_far:
+def evened_initial_map(disk: DiskMesh, log: RunLog, large: bool = False) -> InitialChartMap | None:
+    """A disk of a middle size at most, or a large one, embedded in its domain by evened weights; None where that
+    squeezes it. It leaves as little to do as conformal map and transport, which take as long as the refinement."""
+    if large != (len(disk.vertices) > DIRECT_WITH_ROOM) or disk.is_far:
         return None
-    with log.timed("embedding"):
-        return None if disk.evened is None else InitialChartMap(disk.evened)
+    faces, outline = elements(disk.vertices, disk.triangles, disk.target), (disk.loop, disk.corners, disk.domain)
+    with log.timed("embedding"), suppress(FoldedUVError, PrecisionError):
+        # A transport within a circle that vertices are going to leave is no better start.
+        most = np.inf if disk.boundary == "disk" and is_crowded(disk.triangles, disk.loop, disk.target) else SQUEEZED
+        evened = evened_sites(faces, disk.vertices, outline, SMOOTH_WEIGHT, most, lambda: True, disk.order)
+        return None if evened is None else InitialChartMap(evened)
+    return None
 
 
 def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
-    """Map a disk by itself: flattened where its boundary is free and it may be, by conformal map and transport else."""
-    flat = flat_initial_map(disk, log) if disk.boundary == "free" else None
-    return (yield from initial_map(disk, log)) if flat is None else flat
+    """Map a disk by itself: flattened or, if large, embedded where it may be, else by conformal map and transport."""
+    found = flat_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log, large=True)
+    return (yield from initial_map(disk, log)) if found is None else found
 
 
 def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool, goal: float) -> Refinement | None:
