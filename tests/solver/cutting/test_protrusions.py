@@ -5,7 +5,16 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
+from omt_uv.solver.cutting.cut_graph import cut_classes, path_to
 from omt_uv.solver.cutting.protrusions import disk_spread, log_scale, outline_spread, spread
+from omt_uv.solver.mesh.geometry import (
+    LEAST_STIFFNESS,
+    angle_defects,
+    angles_from_lengths,
+    halfedge_lengths,
+    laplacian_from_lengths,
+)
+from omt_uv.solver.mesh.topology import on_boundary
 
 
 def uncut(component):
@@ -31,6 +40,25 @@ def test_the_scale_does_not_depend_on_the_unit():
     scale = log_scale(one, uncut(one))
     np.testing.assert_allclose(log_scale(other, uncut(other)), scale, rtol=1e-6)
     assert spread(one, 2 * scale) == pytest.approx(4 * spread(one, scale))
+
+
+def test_a_cut_holds_both_of_its_sides_at_zero_and_all_else_as_if_it_were_open():
+    """The surface without the cut, its vertices on the cut held, is that which is cut open along it."""
+    V, F = meshes.head(12)
+    component = component_of(V, F)
+    cut = path_to(component, np.flatnonzero(component.on_boundary()), int(np.argmax(component.positions[:, 2])))
+    classes, scale = cut_classes(component, cut), log_scale(component, cut)
+    opened = np.zeros((int(classes.max()) + 1, 3))
+    opened[classes] = component.positions[component.triangles]
+    # Not by `component_of`, which numbers vertices by their places: both sides of a cut lie in one.
+    length = halfedge_lengths(opened, classes).reshape(-1, 3)
+    loop = on_boundary(classes, len(opened))
+    curvature = angle_defects(classes, angles_from_lengths(length), np.flatnonzero(loop), len(opened))
+    laplacian = laplacian_from_lengths(length, classes, len(opened), LEAST_STIFFNESS).toarray()
+    there = np.zeros(len(opened))
+    there[~loop] = np.linalg.solve(laplacian[~loop][:, ~loop], curvature[~loop])
+    assert cut.sum() > 3 and loop.sum() > component.on_boundary().sum() + cut.sum()
+    np.testing.assert_allclose(scale[component.triangles], np.abs(there)[classes], atol=1e-9)
 
 
 def test_the_spread_of_a_constant_is_its_square():

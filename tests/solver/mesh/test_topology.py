@@ -7,9 +7,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from omt_uv.solver.mesh.topology import (
+    are_among,
     boundary_edges,
     boundary_loops,
+    distinct,
     expand,
+    first_places,
     graph_components,
     halfedges,
     next_halfedge,
@@ -97,3 +100,49 @@ def test_keys_of_pairs_give_these_back():
     rng = np.random.default_rng(0)
     a, b = rng.integers(0, 2**31 - 1, (2, 50))
     assert np.array_equal(paired(pair_keys(a, b)), np.sort(np.stack([a, b], axis=1), axis=1))
+
+
+# Integers that are counted, and those that are compared: large ones, negative ones, and none.
+NUMBERS = {
+    "small": np.random.default_rng(0).integers(0, 40, 100),
+    "rows": np.random.default_rng(1).integers(0, 200, (50, 3)),
+    "narrow": np.random.default_rng(2).integers(0, 40, 100).astype(np.int32),
+    "as large as counted": np.array([12, 0, 12]),
+    "larger": np.array([13, 0, 13]),
+    "large": np.random.default_rng(3).integers(0, 1 << 40, 100),
+    "negative": np.random.default_rng(4).integers(-20, 20, 100),
+    "none": np.zeros(0, np.int64),
+}
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_distinct_numbers_and_their_first_places_are_those_of_sorting(name):
+    numbers = NUMBERS[name]
+    values, first, place = np.unique(numbers.ravel(), return_index=True, return_inverse=True)
+    for found in (distinct(numbers), first_places(numbers)):
+        assert (found[0] == values).all() and found[0].dtype == numbers.dtype
+    assert (distinct(numbers)[1] == place).all() and (first_places(numbers)[1] == first).all()
+
+
+@pytest.mark.parametrize("few", [[], [3], [7, 3, 7, 0], [100], [-1]])
+def test_keys_among_few_are_those_of_numpy(few):
+    keys, few = np.random.default_rng(0).integers(0, 10, 200), np.array(few, np.int64)
+    assert (are_among(keys, few) == np.isin(keys, few)).all()
+    assert len(are_among(keys[:0], few)) == 0
+
+
+def test_components_of_many_nodes_do_not_mind_edges_that_are_there_twice_or_lead_nowhere():
+    a, b = np.random.default_rng(0).integers(0, 5000, (2, 4000))
+    once = graph_components(a, b, 5000)
+    again = graph_components(np.concatenate([a, b, a, a]), np.concatenate([b, a, b, a]), 5000)
+    assert once[0] == again[0] == once[1].max() + 1 and (once[1] == again[1]).all()
+    # Numbered as they first occur.
+    assert (np.sort(np.unique(once[1], return_index=True)[1]) == np.unique(once[1], return_index=True)[1]).all()
+
+
+@pytest.mark.parametrize("name", [*OPEN, *CLOSED])
+def test_vertices_on_the_boundary_are_those_of_sides_without_a_twin(name):
+    V, F = (OPEN | CLOSED)[name]
+    found = np.zeros(len(V), bool)
+    found[boundary_edges(F)] = True
+    assert (on_boundary(F, len(V)) == found).all()

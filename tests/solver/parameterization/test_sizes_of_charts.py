@@ -85,6 +85,16 @@ def test_charts_up_to_a_middle_size_are_evened(count, tried, monkeypatch):
     assert (found is not None) == tried
 
 
+@pytest.mark.parametrize("count, tried", [(9000, False), (9001, True)])
+def test_larger_ones_in_a_domain_are_evened_where_they_are_mapped_by_themselves(count, tried, monkeypatch):
+    monkeypatch.setattr(initial_map, "elements", lambda *_: None)
+    monkeypatch.setattr(initial_map, "is_crowded", lambda *_: False)
+    monkeypatch.setattr(initial_map, "evened_sites", lambda *_: "evened")
+    monkeypatch.setattr(initial_map, "initial_map", lambda *_: worked("transported"))
+    found = drain(initial_map.direct_initial_map(sized(count, boundary="disk"), RunLog()))
+    assert (found.uv == "evened") if tried else (found == "transported")
+
+
 @pytest.mark.parametrize("count, embedded", [(200_000, [True]), (200_001, [False, True])])
 @pytest.mark.parametrize("given", [{}, {"draft": True}, {"flat": "flat"}, {"far": True}])
 def test_a_coarser_mesh_of_very_large_charts_is_embedded_first(count, embedded, given, monkeypatch):

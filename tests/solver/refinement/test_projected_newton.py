@@ -46,6 +46,21 @@ def test_assembly_sums_what_a_dense_sum_does():
     assert np.allclose(matrix.toarray(), dense + np.diag(np.arange(2 * n)))
 
 
+def test_assembly_of_quads_and_of_corners_that_follow_one_vertex_sums_what_a_dense_sum_does():
+    """Of half of a mirrored mesh two corners of a triangle may be one vertex, and some vertices in no cell."""
+    F, Q, n = np.array([[0, 1, 2], [2, 1, 1], [4, 2, 0]]), np.array([[0, 1, 2, 4], [4, 4, 1, 0]]), 6
+    rng = np.random.default_rng(0)
+    given = [rng.normal(size=(len(cells), 2 * cells.shape[1], 2 * cells.shape[1])) for cells in (F, Q)]
+    given = [blocks + np.swapaxes(blocks, 1, 2) for blocks in given]
+    dense = np.diag(np.arange(12.0))
+    for cells, blocks in zip((F, Q), given, strict=True):
+        for cell, block in zip(cells, blocks, strict=True):
+            unknowns = (2 * cell[:, None] + [0, 1]).ravel()
+            np.add.at(dense, np.ix_(unknowns, unknowns), block)
+    matrix = Assembly(F, n, None, Q).matrix(given[0], np.arange(12.0), given[1])
+    assert np.allclose(matrix.toarray(), dense) and matrix.has_sorted_indices
+
+
 def test_first_fold_is_where_the_first_face_has_no_area():
     V, F = meshes.random_disk()
     w = complex_map(V, F)
