@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.energy import Elements, elements
-from ..mesh.geometry import complex_cross, cross2, cross3, dot2, face_areas, lengths
+from ..mesh.geometry import complex_cross, cross2, cross3, face_areas, lengths
 from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
@@ -130,7 +130,9 @@ def coarsen_disk(
         triangles, mass, removal = _round(vertices, triangles, flat, mass, rank)
         rounds.append(removal)
         left -= len(removal.vertex)
-        boundary = boundary[~np.isin(boundary, removal.vertex)]
+        stays = np.ones(count, bool)
+        stays[removal.vertex] = False
+        boundary = boundary[stays[boundary]]
         if len(removal.vertex) < LEAST_PROGRESS * left:
             break
     kept = np.unique(triangles)
@@ -177,7 +179,7 @@ def _round(V, F, flat, mass, rank):
     # They wait for the way back, and take half of the memory that they were found in.
     kept = {name: values.astype(np.int32) for name, values in numbers.items()}
     removal = RemovalRound(share=share, mass=mass[star, 0], **kept)
-    size = np.sqrt(_squared(_normals(V, new)[0]))
+    size = np.sqrt(_squared(_normals(V, new)[0].T))
     part = size / np.maximum(np.bincount(row[stays], size, len(vertex)), 1e-300)[row[stays]]
     others = np.ones(len(F), bool)
     others[star] = False
@@ -235,14 +237,15 @@ def _best_collapses(V, flat, v, after, before, ahead):
     other = other + first[row[candidate]]
     into = after[candidate]
     gone = (after[other] == into) | (before[other] == into)
-    new = np.column_stack([into, after[other], before[other]])
     normal, old = _normals(V, np.column_stack([v, after, before]))
-    new_normal, shape = _normals(V, new)
+    new_normal, shape = _normals_of(*_gathered(V, after, before, candidate, other))
     whole = _sums(row, normal)
-    turned = (new_normal * whole[row[candidate]]).sum(1) <= 0
-    begin = np.searchsorted(candidate, np.arange(len(v)))
+    along = [x * y[row[candidate]] for x, y in zip(new_normal, whole.T.copy(), strict=True)]
+    turned = along[0] + along[1] + along[2] <= 0
+    begin = np.cumsum(size[row]) - size[row]
     score = np.minimum.reduceat(np.where(gone, np.inf, shape), begin)
-    turned = turned if flat is None else turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)
+    if flat is not None:
+        turned |= _flat_shape(*_gathered(flat, after, before, candidate, other)) < LEAST_FLAT_SHAPE
     bad = np.logical_or.reduceat(~gone & turned, begin)
     # Nor does an inner vertex go to the boundary: edges across would cut off parts that have no room in a domain.
     bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0)) | ~np.isfinite(score)
@@ -321,21 +324,37 @@ def _left(edge):
 def _normals(V, F):
     """Normals (m,3) of triangles, as long as twice their areas, and their shapes (m,): 4 sqrt(3) area over the squared
     sides, 1 for equilateral triangles, 0 for degenerate ones."""
-    a, b, c = (np.take(V, F[:, k], axis=0) for k in range(3))
-    ab, bc, ca = b - a, c - b, a - c
-    x, y, z = ab.T
-    u, v, w = -ca.T
-    normal = np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u])
+    normal, shape = _normals_of(*(list(np.take(V, F[:, k], axis=0).T) for k in range(3)))
+    return np.column_stack(normal), shape
+
+
+def _normals_of(a, b, c):
+    """`_normals` of triangles with these corners, by coordinates (m,) each, the normals, too."""
+    ab, bc, ca = ([y - x for x, y in zip(p, q, strict=True)] for p, q in ((a, b), (b, c), (c, a)))
+    x, y, z = ab
+    u, v, w = (-side for side in ca)
+    normal = [y * w - z * v, z * u - x * w, x * v - y * u]
     squares = _squared(ab) + _squared(bc) + _squared(ca)
     return normal, 2 * np.sqrt(3) * np.sqrt(_squared(normal)) / np.maximum(squares, 1e-300)
 
 
+def _gathered(points, after, before, candidate, other):
+    """Coordinates of the corners of new triangles: of the places of the vertices `after` of candidates, and `after` and
+    `before` of other faces; faces share these, and each coordinate by itself is gathered faster."""
+    one, two = points[after].T.copy(), points[before].T.copy()
+    return [x[candidate] for x in one], [x[other] for x in one], [x[other] for x in two]
+
+
 def _squared(vectors):
-    x, y, z = vectors.T
+    """Squares of the lengths of vectors, by coordinates (m,) each."""
+    x, y, z = vectors
     return x * x + y * y + z * z
 
 
-def _flat_shape(uv, F):
-    a, b, c = (uv[F[:, k]] for k in range(3))
-    squares = dot2(b - a, b - a) + dot2(c - b, c - b) + dot2(a - c, a - c)
-    return 2 * np.sqrt(3) * cross2(b - a, c - a) / np.maximum(squares, 1e-300)
+def _flat_shape(a, b, c):
+    """Shapes, as in `_normals`, of triangles in the plane with these corners, by coordinates (m,) each; negative where
+    they are turned over."""
+    (ax, ay), (bx, by), (cx, cy) = a, b, c
+    abx, aby, bcx, bcy, cax, cay = bx - ax, by - ay, cx - bx, cy - by, ax - cx, ay - cy
+    squares = (abx * abx + aby * aby) + (bcx * bcx + bcy * bcy) + (cax * cax + cay * cay)
+    return 2 * np.sqrt(3) * (abx * (cy - ay) - aby * (cx - ax)) / np.maximum(squares, 1e-300)
