@@ -22,13 +22,14 @@ def box_pairs(
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low = np.minimum(low1.min(0), low2.min(0))
     extents = np.maximum(high1.max(0), high2.max(0)) - low
-    pairs = _swept(low1, high1, low2, high2, int(extents.argmax()))
-    if pairs is None:
-        pairs = _in_grid(low1, high1, low2, high2, low, float(extents.max()))
-    i, j = pairs
+    along = int(extents.argmax())
+    pairs = _swept(low1, high1, low2, high2, along)
+    # Those of a sweep meet along its axis.
+    left = (1 - along,) if pairs is not None else (0, 1)
+    i, j = _in_grid(low1, high1, low2, high2, low, float(extents.max())) if pairs is None else pairs
     meet = np.ones(len(i), bool)
     # Axis by axis: millions of edges have many millions of pairs.
-    for axis in range(2):
+    for axis in left:
         meet &= (low1[:, axis][i] <= high2[:, axis][j]) & (low2[:, axis][j] <= high1[:, axis][i])
     key = np.sort(i[meet] * len(low2) + j[meet])
     key = key[np.append(True, key[1:] != key[:-1])] if len(key) else key

@@ -88,6 +88,10 @@ def _lone_triangle(chart: Chart) -> tuple[Chart, np.ndarray]:
 def _polygon_keys(triangles: np.ndarray, polygon: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of the polygon (m,) of each triangle: the highest vertex, the sum of all, the lowest; whichever way it is cut."""
     count, n = int(polygon.max(initial=-1)) + 1, int(triangles.max(initial=-1)) + 1
+    if count == len(triangles):
+        ends = np.maximum(triangles[:, 1], triangles[:, 2]), np.minimum(triangles[:, 1], triangles[:, 2])
+        total = (triangles[:, 0] + triangles[:, 1] + triangles[:, 2]).astype(float)
+        return np.maximum(triangles[:, 0], ends[0]), total, np.minimum(triangles[:, 0], ends[1])
     pairs = np.unique(np.repeat(polygon, 3) * np.int64(n) + triangles.ravel())
     owner, vertex = np.divmod(pairs, n)
     first = np.searchsorted(owner, np.arange(count))
