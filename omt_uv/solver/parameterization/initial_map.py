@@ -52,9 +52,8 @@ SITE_RESOLUTION = 1e-7
 COARSE_ABOVE = 5000
 # Up to so many come without where their boundary is free and what they start from has room: that shears less.
 DIRECT_WITH_ROOM = 9000
-# Charts of at most so many vertices start from a mean value map where others start from an evened one: steps take
-# little time there, and searches for seams foretell the shear of a map by that of coarse surfaces with such a start.
-EVENED_ABOVE = 1500
+# Charts of at most so many vertices start from a mean value map and no evened one: steps take little time there.
+EVENED_ABOVE = 400
 # Of charts with more than this a coarser one is embedded, since factors of all of them take as much memory as all else.
 EMBEDDED = 200_000
 # That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
@@ -184,7 +183,7 @@ class InitialChartMap:
 
 
 def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
-    """A disk flattened with the boundary as it comes, bent where that would cover itself, or a mean value map.
+    """A disk flattened with the boundary as it comes; where that would cover itself, it bent or a mean value map.
 
     None where it would scale unevenly: areas are farther from a mean value map than from the transport's, then.
     """
@@ -192,8 +191,9 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
         flat = _evenly_flattened(disk, spread)
         if flat is None or is_one_to_one(flat, disk.triangles, disk.loop):
             return None if flat is None else InitialChartMap(flat)
-        bent = None if len(disk.vertices) <= EVENED_ABOVE else disk.bent
-        return InitialChartMap(disk.embedded if bent is None else bent)
+        faces = elements(disk.vertices, disk.triangles, disk.target)
+        starts = (uv for uv in (disk.bent, disk.embedded) if uv is not None)
+        return InitialChartMap(min(starts, key=lambda uv: _energy(faces, uv, SMOOTH_WEIGHT)))
 
 
 def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:

@@ -93,6 +93,7 @@ class ShearSearch:
             memory=self.memory,
             asked=float(np.log(self.shear.bound) ** 2),
             rehearse=self.rehearsed if self.shear.bound >= LEAST_REHEARSED else None,
+            rehearsed=self.rehearsals,
         )
 
     def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
@@ -165,6 +166,11 @@ class ShearSearch:
     @cached_property
     def memory(self) -> dict:
         """What a first search has found."""
+        return {}
+
+    @cached_property
+    def rehearsals(self) -> dict[bytes, float | None]:
+        """What small surfaces were found to shear: later searches come to the same ones."""
         return {}
 
     @cached_property

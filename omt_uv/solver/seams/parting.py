@@ -36,6 +36,8 @@ LEAST_COVER = 3e-3
 LEAST_PART = 0.03
 # Slits at once at most, the first time: small ones far from a seam cost more than they are worth.
 MOST_SLITS = 4
+# What has less than this share of what is to be slit comes last, however near it is.
+LITTLE = 0.05
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
 # The image of a part whose vertices have none ends within this share of the side of a square with its area of where
@@ -304,7 +306,8 @@ def slits(
     images: MirrorImages | None = None,
     rounds: int = 1,
 ) -> np.ndarray:
-    """Edges (k,2) of the surface from the boundary of a chart into what shears too much, the largest parts first.
+    """Edges (k,2) of the surface from the boundary of a chart into what shears too much, first into the parts that are
+    large for the length of their slit.
 
     steep (m,) bool : triangles that do; least : area of what is to be slit at least; barred (n,) bool : vertices that
     no slit passes through, unless there is not as much to be slit elsewhere; cost, images : see `parted`; rounds :
@@ -317,15 +320,18 @@ def slits(
         free[:] = bad[graph.polygon[steep]] = True
     piece = graph.pieces(bad[graph.joined].all(axis=1))
     size = np.bincount(piece, np.where(bad, graph.area, 0.0))
-    order = np.argsort(-size, kind="stable")
-    enough = int(np.searchsorted(np.cumsum(size[order]), least)) + 1
-    # One more every time, at least: the same slits would be in vain again.
-    chosen = order[: min(max(enough, rounds), rounds * MOST_SLITS)]
     open_ = free[graph.ends].all(axis=1)
     n, ends, price = len(chart.vertices), graph.ends[open_], graph.prices(chart, cost)[open_] + 1e-300
     ways = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
-    known, image_here = pair_keys(*ends.T), _images_in(chart, None if images is None else images.exact)
     start, found = np.unique(boundary_edges(chart.triangles)), []
+    reach = dijkstra(ways, indices=start, min_only=True)[chart.triangles[steep]]
+    length = np.full(len(size), 1e-300)
+    np.maximum.at(length, piece[graph.polygon[steep]], np.where(np.isfinite(reach), reach, 0.0).max(axis=1))
+    order = np.lexsort((-size, -np.where(size >= LITTLE * least, size / length, 0.0)))
+    enough = int(np.searchsorted(np.cumsum(size[order]), least)) + 1
+    # One more every time, at least: the same slits would be in vain again.
+    chosen = order[: min(max(enough, rounds), rounds * MOST_SLITS)]
+    known, image_here = pair_keys(*ends.T), _images_in(chart, None if images is None else images.exact)
     for k in chosen[bad[np.unique(piece, return_index=True)[1]][chosen]]:
         around = np.unique(chart.triangles[steep & (piece[graph.polygon] == k)])
         far, before, _ = dijkstra(ways, indices=start, min_only=True, return_predecessors=True)

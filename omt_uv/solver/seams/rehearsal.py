@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from hashlib import sha256
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -64,14 +65,14 @@ class Rehearsal:
     log_density : half the logarithm of the density (c,) at the vertices of a coarse surface, or None
     sheared : gives the square of log(shear) of a small surface along its seams for such a density (n,), None where it
         has no map of its own; itself None where predictions have to do
-    known : what was rehearsed, by what the small surface is
+    known : what was rehearsed, by a digest of what the small surface is
     """
 
     component: CutComponent
     normal: np.ndarray | None
     log_density: Callable[[CoarseSurface], np.ndarray | None]
     sheared: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None
-    known: dict[tuple[bytes, ...], float | None]
+    known: dict[bytes, float | None]
 
     def of(self, found: CoarseCut) -> Steps[float | None]:
         """The square of log(shear) of a map of the coarse surface that is cut so; None where there is no such map."""
@@ -85,7 +86,7 @@ class Rehearsal:
         density = None if density is None else density[opening.vertex]
         parts = opening.positions, opening.triangles, opening.seams
         # Ways to make a cut longer often come to the same.
-        name = tuple(part.tobytes() for part in (*parts, density) if part is not None)
+        name = sha256(b"".join(part.tobytes() for part in (*parts, density) if part is not None)).digest()
         if name not in self.known:
             try:
                 self.known[name] = yield from self.sheared(triangle_surface(*parts), density)

@@ -101,7 +101,7 @@ class SeamSearch:
     begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
     asked: float = 0.0
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
-    rehearsed: dict[tuple[bytes, ...], float | None] = field(default_factory=dict)
+    rehearsed: dict[bytes, float | None] = field(default_factory=dict)
 
     @property
     def is_again(self) -> bool:

@@ -84,7 +84,7 @@ def test_there_is_no_start_with_room_where_it_would_be_squeezed_or_another_one_i
     assert roomy_initial_map(disk_of(*subdivided(*meshes.spiral_strip())), RunLog()) is None
     V, F = subdivided(*meshes.head(50))
     assert roomy_initial_map(disk_of(V, F, "disk"), RunLog()) is None
-    assert roomy_initial_map(disk_of(*meshes.head(20)), RunLog()) is None
+    assert roomy_initial_map(disk_of(*meshes.head(15)), RunLog()) is None
     density = np.where(V[F].mean(axis=1)[:, 0] > V[:, 0].mean(), 100.0, 1.0)
     magnified = DiskMesh(V, F, face_areas(V, F) * density, boundary_loops(F)[0])
     assert roomy_initial_map(magnified, RunLog()) is None

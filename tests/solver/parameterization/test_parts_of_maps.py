@@ -189,6 +189,12 @@ def test_searches_are_rehearsed_from_a_bound_on(bound, rehearses):
     assert found.asked == pytest.approx(np.log(bound) ** 2)
 
 
+def test_a_later_search_knows_what_was_rehearsed_before():
+    search = search_of()
+    search.search(np.zeros(10)).rehearsed[b"it"] = 0.1
+    assert search.search(np.ones(10)).rehearsed == {b"it": 0.1} and search_of().search(np.ones(10)).rehearsed == {}
+
+
 def test_twins_are_found_by_the_images_of_all_vertices():
     image = np.array([3, 4, 5, 0, 1, 2, 6])
     charts = [SimpleNamespace(vertex_ids=np.array(x)) for x in ([2, 0, 1], [0, 1, 6], [5, 4, 3], [3, 4, 6], [6])]
@@ -496,22 +502,21 @@ def flat_uv(disk):
 
 
 @pytest.mark.parametrize(
-    "spread, one, large, found",
+    "spread, one, stretch, found",
     [
-        (False, True, False, None),
-        (True, True, False, "flat"),
-        (True, False, False, "embedded"),
-        (True, False, True, "bent"),
-        (True, False, "unbent", "embedded"),
+        (False, True, 1, None),
+        (True, True, 1, "flat"),
+        (True, False, 50, "embedded"),
+        (True, False, 1, "bent"),
+        (True, False, None, "embedded"),
     ],
 )
-def test_a_flat_start_is_bent_in_large_charts_and_a_mean_value_map_in_small(spread, one, large, found, monkeypatch):
+def test_a_flat_start_is_bent_or_where_that_squeezes_it_a_mean_value_map(spread, one, stretch, found, monkeypatch):
     disk = disk_mesh()
-    flat, bent = flat_uv(disk), flat_uv(disk) + 1
-    monkeypatch.setattr(initial_map, "EVENED_ABOVE", 10 if large else 1500)
+    flat, bent = flat_uv(disk), None if stretch is None else flat_uv(disk) * [stretch, 1]
     monkeypatch.setattr(initial_map, "_evenly_flattened", lambda *_: flat if spread else None)
     monkeypatch.setattr(initial_map, "is_one_to_one", lambda *_: one)
-    disk.__dict__["bent"] = None if large == "unbent" else bent
+    disk.__dict__["bent"] = bent
     start = initial_map.flat_initial_map(disk, RunLog())
     expected = {None: None, "flat": flat, "bent": bent, "embedded": disk.embedded}[found]
     assert start is None if expected is None else start.uv is expected

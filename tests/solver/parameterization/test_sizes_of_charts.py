@@ -28,12 +28,15 @@ def sized(count, **given):
     return SimpleNamespace(**fixed | {"embedded": "embedded", "bent": "bent", "spread": 0.0} | given)
 
 
-@pytest.mark.parametrize("count, start", [(1500, "embedded"), (1501, "bent")])
-def test_what_covers_itself_is_bent_in_large_charts(count, start, monkeypatch):
+@pytest.mark.parametrize("bent, embedded, start", [(1.0, 2.0, "bent"), (2.0, 1.0, "embedded"), (1.0, 1.0, "bent")])
+def test_what_covers_itself_is_bent_or_embedded_with_the_less_energy(bent, embedded, start, monkeypatch):
     monkeypatch.setattr(initial_map, "_evenly_flattened", lambda *_: "flat")
     monkeypatch.setattr(initial_map, "is_one_to_one", lambda *_: False)
-    assert initial_map.flat_initial_map(sized(count), RunLog()).uv == start
-    assert initial_map.flat_initial_map(sized(count, bent=None), RunLog()).uv == "embedded"
+    monkeypatch.setattr(initial_map, "elements", lambda *_: "faces")
+    known = {("faces", "bent", 30.0): bent, ("faces", "embedded", 30.0): embedded}
+    monkeypatch.setattr(initial_map, "_energy", lambda *given: known[given])
+    assert initial_map.flat_initial_map(sized(10), RunLog()).uv == start
+    assert initial_map.flat_initial_map(sized(10, bent=None), RunLog()).uv == "embedded"
 
 
 @pytest.mark.parametrize("spread, flat", [(0.499, "flat"), (0.501, None)])
@@ -48,8 +51,8 @@ def test_what_scales_unevenly_is_not_flattened(spread, flat, monkeypatch):
 @pytest.mark.parametrize(
     "count, what, reaches",
     [
-        (1500, "elements", False),
-        (1501, "elements", True),
+        (400, "elements", False),
+        (401, "elements", True),
         (9000, "elements", True),
         (9001, "elements", False),
         (5000, "_roomy_flat", True),

@@ -128,7 +128,8 @@ def test_pieces_are_mapped_as_if_their_seams_were_given(monkeypatch, seed):
     np.testing.assert_allclose(*shears, rtol=1e-3)
 
 
-def test_limbs_that_come_off_keep_the_bound_by_themselves(monkeypatch):
+@pytest.mark.parametrize("seed", [3, 8])
+def test_limbs_that_come_off_keep_the_bound_by_themselves(seed, monkeypatch):
     """Not only in the mean with what they hung on; what is said is about the pieces."""
     for name in ("SPRAWLING", "FULL", "FULLER", "HOPEFUL"):
         monkeypatch.setattr(limbs, name, 1.0)
@@ -141,7 +142,7 @@ def test_limbs_that_come_off_keep_the_bound_by_themselves(monkeypatch):
         return replace(found, warnings=(f"of {len(first.charts)}",))
 
     monkeypatch.setattr(unwrap_module, "bound_shear", recorded)
-    found = drain(unwrap(meshes.polygon_surface(*with_limbs(2)), options=UnwrapOptions(max_shear=1.35)))
+    found = drain(unwrap(meshes.polygon_surface(*with_limbs(seed)), options=UnwrapOptions(max_shear=1.35)))
     (whole, cuts), (pieces, more) = seen
     assert pieces > whole and more > cuts and found.warnings == (f"of {pieces}",)
     assert all(one.angle_mean <= 1.36 for one in found.maps) and len(found.charts) >= pieces

@@ -316,6 +316,27 @@ def test_more_is_slit_every_time():
     assert [reached(1e-9, rounds) for rounds in (1, 2, 3)] == [1, 2, 3]
 
 
+@pytest.mark.parametrize(
+    "near, radii, least, first",
+    [
+        (0.1, (0.08, 0.1), 1e-9, "near"),
+        (0.1, (0.08, 0.2), 1e-9, "far"),
+        (0.0, (0.03, 0.06), 1e-9, "near"),
+        (0.0, (0.03, 0.06), 0.05, "far"),
+    ],
+)
+def test_slits_go_where_they_are_short_for_what_they_slit(near, radii, least, first):
+    """A spot near the boundary before a larger one far from it, unless that is much larger, or the near one a crumb."""
+    V, F = meshes.grid(60, 60)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    spots = [(0.5, near, 0.0), (0.5, 0.55, 0.0)]
+    both = [steep_spots(V, F, spot, radius=r) for spot, r in zip(spots, radii, strict=True)]
+    cost, barred = np.ones(len(V)), np.zeros(len(V), dtype=bool)
+    order = slits(chart, both[0] | both[1], least, cost, barred)
+    alone = slits(chart, both[first == "far"], least, cost, barred)
+    assert len(alone) and np.array_equal(order[: len(alone)], alone)
+
+
 def test_nothing_steep_nothing_slit():
     V, F = meshes.grid(6, 6)
     (chart,) = strict_charts(triangle_surface(V, F))
