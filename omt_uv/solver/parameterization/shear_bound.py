@@ -142,7 +142,7 @@ def bound_shear(
             break
         if new is not last:  # Else more is asked for.
             tried.add(edge_set(new.cuts.edges))
-            last, worse = last.with_what_is_better(search, new, worse)
+            last, worse = last.with_what_is_better(search, new.with_slits(apart), worse)
     else:
         begin = 1 - 0.5 ** (MOST_ROUNDS - 1)
     best = last if last.excess <= best.excess else best
@@ -182,7 +182,7 @@ def _cut_anew(search: ShearSearch, last: Round, asked: Asked, map_charts, early:
     """The next round; the last one where what was found is not worth a map, and None where the end was asked for."""
     memory = dict(last.memory)
     chosen = [last.charts[k] for k in asked.charts]
-    cutting = search.again(asked.kept, chosen, asked.spread, asked.changes | {"memory": memory})
+    cutting = search.again(asked.kept, chosen, asked.spread, asked.changes | {"memory": memory}, asked.slits)
     again = yield from unless_ended(part_of(cutting, 0.0, SEARCHING), early)
     if again is None:
         return None
@@ -193,7 +193,8 @@ def _cut_anew(search: ShearSearch, last: Round, asked: Asked, map_charts, early:
     mapped = yield from unless_ended(part_of(mapping, SEARCHING, 1 - SEARCHING), early)
     if mapped is None:
         return None
-    return Round.of(search, again.charts, mapped, joined(search, last.cuts, edges), memory, last.settled)
+    cuts = joined(search, last.cuts, edges)
+    return Round.of(search, again.charts, mapped, cuts, memory, last.settled, last.slits)
 
 
 def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, early: EarlyEnd) -> Steps[Round]:
@@ -215,7 +216,7 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
         return last
     spared = dict(zip(last.searched, mapped, strict=True))
     maps = [spared.get(k, one) for k, one in enumerate(last.maps)]
-    new = Round.of(search, last.charts, maps, last.cuts, last.memory, last.settled)
+    new = Round.of(search, last.charts, maps, last.cuts, last.memory, last.settled, last.slits)
     return new if new.excess < last.excess else last
 
 
@@ -235,7 +236,7 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
         for chart in longer:
             share[last.charts[chart].faces] = last.share_allowed(chart) ** hope
         spread = search.first_spread() * share**SPREAD_BY_SHEAR
-        asked = Asked(longer, kept, spread, {"share": share, "adding": True}, is_worth)
+        asked = Asked(longer, kept, spread, {"share": share, "adding": True}, is_worth, last.slits_within(longer))
         cutting = _cut_anew(search, last, asked, map_charts, early)
         new = yield from part_of(cutting, k / len(HOPES), 1 / len(HOPES))
         if new is None or new is last:
@@ -278,7 +279,8 @@ def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd)
         return last
     changes = {"share": np.ones(search.count), "straighter": True, "stays_whole": True}
     differs = edge_set(last.cuts.edges)
-    asked = Asked(chosen, last.kept(chosen), search.first_spread(), changes, lambda edges: edge_set(edges) != differs)
+    given, slits = (chosen, last.kept(chosen), search.first_spread(), changes), last.slits_within(chosen)
+    asked = Asked(*given, lambda edges: edge_set(edges) != differs, slits)
     new = yield from _cut_anew(search, last, asked, map_charts, early)
     if new is None or new is last:
         return last

@@ -52,6 +52,7 @@ SLACK = 0.85
 MARGIN = 0.95
 # What has no map is asked for this share of what cuts have left.
 UNKNOWN = 0.5
+NO_EDGES = np.zeros((0, 2), np.int64)
 # Of a surface in one piece the largest chart has this share of the area, but for crumbs.
 ONE_PIECE = 0.97
 
@@ -112,21 +113,25 @@ class ShearSearch:
             return None
         return float(np.log(sum(area @ local for local, area in shear) / size.sum()) ** 2)
 
-    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, changes: dict) -> Steps[DiskCharts]:
+    def again(
+        self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, changes: dict, slits: np.ndarray = NO_EDGES
+    ) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
-        what changes in the search; the edges that others were cut along (k,2) stay. Of two charts that are each other's
-        mirror image one is searched."""
+        what changes in the search; the edges that others were cut along (k,2) stay, and these are slit (s,2) as before.
+        Of two charts that are each other's mirror image one is searched."""
         target, twin = np.full(self.count, np.inf), self._twins(missed)
         for k, chart in enumerate(missed):
             target[chart.faces] = spread[chart.faces] if twin[k] < 0 else np.inf
         search = replace(self.search(target), further=True, **changes)
         found = yield from part_of(self._cut(kept, search), 0.0, 0.9)
-        if (twin < 0).all():
+        if (twin < 0).all() and not len(slits):
             return found
-        known = found.found_cuts.edges
+        known = np.concatenate([found.found_cuts.edges, slits])
         originals = [missed[k].vertex_ids for k in twin[twin >= 0]]
-        inner = known[np.any([np.isin(known, ids).all(axis=1) for ids in originals], axis=0)]
-        known = np.concatenate([known, self.images.exact[inner]]) if self.images is not None else known
+        if originals and self.images is not None:
+            inner = known[np.any([np.isin(known, ids).all(axis=1) for ids in originals], axis=0)]
+            known = np.concatenate([known, self.images.exact[inner]])
+        known = known[np.sort(np.unique(pair_keys(*known.T), return_index=True)[1])]
         none = replace(search, spread=np.full(self.count, np.inf))
         found = yield from part_of(self._cut(np.concatenate([kept, known]), none), 0.9, 0.1)
         cuts = found.found_cuts
@@ -200,8 +205,8 @@ class ShearSearch:
 @dataclass(frozen=True)
 class Round:
     """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the same
-    but above the bound where too much is steep (k,), the numbers of those that miss it and may be cut for that, and the
-    keys (s,) of edges that stay cut when these are cut anew."""
+    but above the bound where too much is steep (k,), the numbers of those that miss it and may be cut for that, the
+    keys (s,) of edges that stay cut when these are cut anew, and those (s,) of slits into what was steep."""
 
     charts: list[Chart]
     maps: list[ChartMap]
@@ -212,7 +217,8 @@ class Round:
     pressing: np.ndarray
     bound: float
     searched: list[int]
-    settled: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    settled: np.ndarray = field(default_factory=lambda: NO_EDGES[:, 0])
+    slits: np.ndarray = field(default_factory=lambda: NO_EDGES[:, 0])
 
     @staticmethod
     def of(
@@ -221,7 +227,8 @@ class Round:
         maps: list[ChartMap],
         cuts: Cuts,
         memory: dict,
-        settled: np.ndarray | None = None,
+        settled: np.ndarray = NO_EDGES[:, 0],
+        slits: np.ndarray = NO_EDGES[:, 0],
     ) -> Round:
         shear = [local_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
         mean = np.array([area @ local / area.sum() for local, area in shear])
@@ -234,13 +241,21 @@ class Round:
         # What has no map at all is cut further without being asked: otherwise there would be nothing to look at.
         asked = [search.shear.further or one.failure is not None for one in maps]
         searched = [int(k) for k in missed if asked[k] or not is_marked(search.surface, charts[k])]
-        settled = np.zeros(0, np.int64) if settled is None else settled
-        return Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched, settled)
+        return Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched, settled, slits)
 
     def kept(self, chosen: list[int]) -> np.ndarray:
         """The edges (e,2) that stay cut when charts of these numbers are cut anew."""
         keys, inner = pair_keys(*self.cuts.edges.T), all_within([self.charts[k] for k in chosen])
         return self.cuts.edges[~np.isin(keys, inner) | np.isin(keys, self.settled)]
+
+    def with_slits(self, found: dict[int, np.ndarray]) -> Round:
+        """The same that knows its slits among these edges (e,2)."""
+        return replace(self, slits=np.union1d(self.slits, pair_keys(*np.concatenate([NO_EDGES, *found.values()]).T)))
+
+    def slits_within(self, chosen: list[int]) -> np.ndarray:
+        """The slits (e,2) within charts of these numbers."""
+        keys = pair_keys(*self.cuts.edges.T)
+        return self.cuts.edges[np.isin(keys, all_within([self.charts[k] for k in chosen])) & np.isin(keys, self.slits)]
 
     @property
     def excess(self) -> float:
@@ -282,7 +297,8 @@ class Round:
         region = self._region(search)
         memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
         memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
-        return Round.of(search, charts, maps, joined(search, self.cuts, edges), memory, self.settled)
+        cuts = joined(search, self.cuts, edges)
+        return Round.of(search, charts, maps, cuts, memory, self.settled, new.slits)
 
     @property
     def has_room(self) -> np.ndarray:
@@ -374,13 +390,14 @@ class Round:
 @dataclass(frozen=True)
 class Asked:
     """Numbers of charts to be cut anew for a spread (f,), the edges (k,2) that stay cut all the same, what changes in
-    the search, and whether edges (k,2) that it comes to are worth a map."""
+    the search, whether edges (k,2) that it comes to are worth a map, and the slits (s,2) that are made again."""
 
     charts: list[int]
     kept: np.ndarray
     spread: np.ndarray
     changes: dict[str, Any]
     is_worth: Callable[[np.ndarray], bool]
+    slits: np.ndarray = field(default_factory=lambda: NO_EDGES)
 
     @staticmethod
     def of(

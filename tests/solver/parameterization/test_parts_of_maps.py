@@ -227,10 +227,29 @@ def test_only_one_of_two_twins_is_searched_and_both_are_cut(monkeypatch):
         SimpleNamespace(vertex_ids=np.array([0, 1, 2]), faces=np.array([0, 1])),
         SimpleNamespace(vertex_ids=np.array([3, 4, 5]), faces=np.array([2, 3])),
     ]
-    found = drain(search.again(np.array([[8, 9]]), charts, np.arange(10.0), {}))
-    np.testing.assert_array_equal(asked[0][1], [0, 1] + [np.inf] * 8)
-    assert asked[1][0] == [[8, 9], [0, 1], [2, 9], [3, 4]] and np.isinf(asked[1][1]).all()
-    assert found.cuts.edges.tolist() == [[0, 1], [2, 9], [3, 4], [7, 8]]
+    slits = np.array([[1, 2], [4, 5], [6, 0]])
+    for given, more in (((), [[3, 4]]), ((slits,), [[1, 2], [4, 5], [6, 0], [3, 4]])):
+        asked.clear()
+        found = drain(search.again(np.array([[8, 9]]), charts, np.arange(10.0), {}, *given))
+        np.testing.assert_array_equal(asked[0][1], [0, 1] + [np.inf] * 8)
+        assert asked[1][0] == [[8, 9], [0, 1], [2, 9], *more] and np.isinf(asked[1][1]).all()
+        assert found.cuts.edges.tolist() == [[0, 1], [2, 9], *more, [7, 8]]
+    # By itself none has an image, and what was slit is slit again, nothing else.
+    asked.clear()
+    found = drain(search.again(np.array([[8, 9]]), charts[:1], np.arange(10.0), {}, slits[:1]))
+    assert [kept for kept, _ in asked] == [[[8, 9]], [[8, 9], [0, 1], [2, 9], [1, 2]]]
+    asked.clear()
+    found = drain(search.again(np.array([[8, 9]]), charts[:1], np.arange(10.0), {}))
+    assert len(asked) == 1 and found.cuts.edges.tolist() == [[0, 1], [2, 9]]
+
+
+def test_slits_within_charts_are_known_to_later_rounds():
+    slit_open = SimpleNamespace(triangles=np.array([[0, 1, 2], [3, 4, 5]]), vertex_ids=np.array([0, 1, 2, 0, 2, 3]))
+    one = replace(round_of([1], [1.0], charts=[slit_open]), cuts=cuts_of([[2, 0], [0, 1], [9, 1]]))
+    assert not len(one.slits_within([0])) and one.with_slits({}).slits.tolist() == []
+    slit = one.with_slits({0: np.array([[0, 2]])}).with_slits({3: np.array([[1, 9]])})
+    assert slit.slits_within([0]).tolist() == [[2, 0]] and not len(slit.slits_within([]))
+    assert not len(one.slits)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +290,8 @@ def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
 
     made = []
 
-    def of(search, charts, maps, cuts, memory, settled):
+    def of(search, charts, maps, cuts, memory, settled, slits):
+        assert settled is last.settled and slits is last.slits
         made.append(maps)
         return round_of([1, 1], [1.0, after])
 
@@ -380,6 +400,7 @@ def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, 
     last, new = with_prices([1.3, 1.3], [10, 8]), with_prices(pressing, prices)
     last.charts, last.cuts, last.found_for = [chart, chart], cuts_of([[0, 1]]), lambda k: ["found"]
     last.kept = lambda chosen: asked.append(chosen)
+    last.slits_within = lambda chosen: ("slits", *chosen)
     last.chart_of = lambda search, other: np.array(parts)
     last.merged = lambda search, other, of, stay: stay
     asked = []
@@ -394,6 +415,7 @@ def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, 
     found = drain(shear_bound._straightened(search, last, None, EarlyEnd()))
     assert found is last if not any(taken) else (~found).tolist() == taken
     assert asked[0] == [0, 1] and asked[1].changes["straighter"] and asked[1].changes["stays_whole"]
+    assert asked[1].slits == ("slits", 0, 1)
     assert asked[1].is_worth(np.array([[1, 2]])) and not asked[1].is_worth(np.array([[1, 0]]))
 
 
