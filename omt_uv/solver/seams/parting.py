@@ -173,7 +173,8 @@ def _image_of(
     there = np.bincount(graph.polygon, inside[nearest[corner]].mean(axis=1), len(side)) > 0.5 * count
     other = float(graph.area[there != side].sum())
     whole = float(graph.area.sum())
-    if min(other, whole - other) < LEAST_PART * whole or not graph.around(there).any():
+    smaller = min(float(graph.area[side].sum()), float(graph.area[~side].sum()))
+    if min(other, whole - other) < min(LEAST_PART * whole, smaller) or not graph.around(there).any():
         return side
     beside = np.unique(graph.joined[graph.around(there)])
     far = dijkstra(graph.steps(chart), indices=beside, min_only=True)
@@ -195,9 +196,12 @@ def lies_on_its_image(chart: Chart, ends: np.ndarray, images: MirrorImages) -> b
 def _without_crumbs(chart: Chart, graph: PolygonGraph, cut: np.ndarray, both: np.ndarray) -> np.ndarray:
     """A cut with its image `both` (e,) bool, without crumbs between them; `cut` (e,) bool where some stay."""
     length, both = edge_lengths(chart.vertices, graph.ends), both.copy()
+    # What comes off by itself, a horn, is none, nor is its image.
+    smallest = np.bincount(graph.pieces(~cut), graph.area).min()
+    least = min(LEAST_PART * graph.area.sum(), smallest) / 2
     for _ in range(MOST_CRUMBS):
         piece = graph.pieces(~both)
-        crumb = np.bincount(piece, graph.area) < LEAST_PART / 2 * graph.area.sum()
+        crumb = np.bincount(piece, graph.area) < least
         if not crumb.any():
             return both
         # Each joins the piece that it has most of an outline with.

@@ -16,7 +16,16 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.seams.parting import LEAST_PART, MOST_SLITS, flat_sides, parted, slits
+from omt_uv.solver.seams.parting import (
+    LEAST_PART,
+    MOST_SLITS,
+    PolygonGraph,
+    capacities,
+    flat_sides,
+    parted,
+    slits,
+    with_images,
+)
 
 
 def ramp(turns, steps=60, rings=6, rise=0.2):
@@ -75,6 +84,30 @@ def test_cuts_have_images_and_leave_no_crumbs_between(row, pieces):
     assert row in step[both] and np.abs(np.abs(step[both] - 44.5) - np.abs(row - 44.5)).max() < 5
     # Where there is no image, a cut stays as it is.
     assert np.array_equal(parted(chart, uv, cost, MirrorImages.of(np.full(len(V), -1))), alone)
+
+
+@pytest.mark.parametrize("size", [2, 4, 9])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_the_image_of_what_comes_off_comes_off_too_however_small(size, flipped):
+    """Of a cow both horns, or none, also where a diagonal is no mirror image."""
+    n = 40
+    V, F = meshes.grid(n, n)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    graph = PolygonGraph.of(chart)
+    middle = V[F].mean(axis=1)[:, :2] * n
+    apart = np.zeros(len(graph.area), dtype=bool)
+    apart[graph.polygon[(np.abs(middle - [6 + size / 2, 20]) < size / 2).all(axis=1)]] = True
+    if flipped:
+        # Half of a cell sticks out, and its diagonal runs the other way in the image.
+        edge = 20 * (n + 1) + 6 + size + np.array([0, n + 1])
+        apart[graph.polygon[np.isin(F, edge).sum(axis=1) == 2]] = True
+    y, x = np.divmod(np.arange(len(V)), n + 1)
+    images = MirrorImages.of(y * (n + 1) + n - x)
+    cut = graph.around(apart)
+    both = with_images(chart, graph, cut, images, [apart], capacities(graph.prices(chart, np.ones(len(V)))))
+    area = np.sort(np.bincount(graph.pieces(~both), graph.area))
+    assert len(area) == 3 and area[1] == pytest.approx(area[0], rel=0.3 if flipped else 1e-9)
+    assert area[0] == pytest.approx(graph.area[apart].sum(), rel=0.3) and both[cut].all()
 
 
 def test_what_lies_beside_itself_stays_whole():
