@@ -60,7 +60,7 @@ FLAT = 1e-9
 GROWN = 0.5
 # The square of log(shear) of a rehearsal, over that of the map: of about the same surface, and of a far finer one.
 # Heads, animals and figures are within a tenth of it.
-REHEARSED = (0.7, 0.9)
+REHEARSED = (0.62, 0.88)
 
 
 @dataclass(frozen=True)
