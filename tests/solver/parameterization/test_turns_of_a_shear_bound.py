@@ -24,6 +24,7 @@ class Made:
     hardly: bool = False
     nothing: bool = False
     shares_asked: list = field(default_factory=list)
+    slits: dict = field(default_factory=dict)
 
     @property
     def searched(self):
@@ -51,6 +52,10 @@ class Made:
     def shares(self, missed, promised, margin):
         self.shares_asked.append((missed, promised.tolist(), round(margin, 9)))
         return np.array([0.5]), np.array([0.25])
+
+    def with_slits(self, found):
+        self.slits |= found
+        return self
 
     def with_what_is_better(self, search, new, worse):
         return new, worse
@@ -196,7 +201,9 @@ def test_a_round_that_hardly_helps_is_the_last_unless_something_comes_apart(boun
 
 def test_where_nothing_is_left_to_be_cut_it_ends(bounded):
     assert names(bounded(Made("first", 3.0, nothing=True))[1], "cut") == []
-    assert names(bounded(Made("first", 3.0, nothing=True), Made("second"), apart=[{0: "edges"}])[1], "cut") == ["first"]
+    second = Made("second")
+    assert names(bounded(Made("first", 3.0, nothing=True), second, apart=[{0: "edges"}])[1], "cut") == ["first"]
+    assert second.slits == {0: "edges"}  # which are known from then on
 
 
 def test_what_is_steep_alone_is_spared_where_areas_may_be_less_exact(bounded):
