@@ -15,6 +15,9 @@ from functools import cache
 
 # Vertices of a mesh of which hundreds of megabytes may be free and not given back.
 MANY = 100_000
+# Vertices of a mesh of which the arrays of single steps take so much: each of them finds other holes that are free, and
+# all that were touched in turn take as much memory as a matrix.
+VERY_MANY = 500_000
 # Bytes that are kept where they are free: what a step of 10,000 vertices asks for, most of which it never touches; and
 # up to which an array is taken from these, as many as the library allows.
 KEPT = 1 << 28
@@ -42,6 +45,12 @@ def _trim() -> Callable[[int], int] | None:
 def give_back_of(vertices: int) -> None:
     """Give back what is free, if it may be much: between the stages of a mesh of so many vertices."""
     if vertices > MANY:
+        give_back()
+
+
+def give_back_often(vertices: int) -> None:
+    """Give back what is free, between the steps of a stage of a mesh of so many vertices."""
+    if vertices > VERY_MANY:
         give_back()
 
 

@@ -48,6 +48,8 @@ TOGETHER = 64
 IN_TURN = 8
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
 SHIFT = 1e-12
+# Vertices whose motions are found at a time: what is found on the way takes more memory than the motions.
+AT_ONCE = 100_000
 
 
 class AdditiveSchwarz:
@@ -184,21 +186,20 @@ def affine_motions(part: np.ndarray, count: int, w: np.ndarray, axes: np.ndarray
     middle = (np.bincount(part, w.real, count) + 1j * np.bincount(part, w.imag, count)) / size
     z = w - middle[part]
     z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
-    moves = (axes != 0).ravel()
-    part, z, along = np.repeat(part, 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves]
-    sides = along.real, along.imag
+    along = axes.ravel()
     # Most unknowns are along an axis of the plane: motions across it do not move them.
-    size, start = np.zeros(len(moves), np.int64), np.zeros(len(moves) + 1, np.int64)
-    size[moves] = sum(3 * (x != 0) for x in sides)
-    np.cumsum(size, out=start[1:])
+    start = np.zeros(len(along) + 1, np.int64)
+    np.cumsum(3 * ((along.real != 0).astype(np.int8) + (along.imag != 0)), out=start[1:])
     entries, columns = np.empty(start[-1]), np.empty(start[-1], np.int32)
-    place = start[:-1][moves]
-    for k, side in enumerate(sides):
-        here = side != 0
-        for m, motion in enumerate((1.0, z.real[here], z.imag[here])):
-            entries[place[here] + m], columns[place[here] + m] = side[here] * motion, 6 * part[here] + 3 * k + m
-        place = place + 3 * here
-    return sp.csr_matrix((entries, columns, start), shape=(len(moves), 6 * count))
+    for begin in range(0, len(part), AT_ONCE):
+        some, here = slice(begin, begin + AT_ONCE), slice(2 * begin, 2 * (begin + AT_ONCE))
+        of, moved, place = np.repeat(part[some], 2), np.repeat(z[some], 2), start[:-1][here].copy()
+        for k, side in enumerate((along[here].real, along[here].imag)):
+            on = side != 0
+            for m, motion in enumerate((1.0, moved.real[on], moved.imag[on])):
+                entries[place[on] + m], columns[place[on] + m] = side[on] * motion, 6 * of[on] + 3 * k + m
+            place += 3 * on
+    return sp.csr_matrix((entries, columns, start), shape=(len(along), 6 * count))
 
 
 def _part_factor(block: sp.csc_matrix) -> Factor:

@@ -62,11 +62,12 @@ def by_gradients(
     most: int,
     enough: float = ENOUGH,
     guess: np.ndarray | None = None,
+    overwrite: bool = False,
 ) -> np.ndarray | None:
     """Conjugate gradients for matrix x = b (n,) until x.matrix.x / 2 - b.x hardly falls any more; None where that takes
-    more than `most` iterations. guess : see `nearly`
+    more than `most` iterations. guess, overwrite : see `nearly`
     """
-    x, done = nearly(matrix, b, precondition, most, enough, guess)
+    x, done = nearly(matrix, b, precondition, most, enough, guess, overwrite)
     return x if done else None
 
 
@@ -77,20 +78,25 @@ def nearly(
     most: int,
     enough: float = ENOUGH,
     guess: np.ndarray | None = None,
+    overwrite: bool = False,
 ) -> tuple[np.ndarray, bool]:
     """What conjugate gradients for matrix x = b (n,) have come to when x.matrix.x / 2 - b.x hardly falls any more or
     `most` iterations are over, and whether these were enough; b.x > 0 in any case.
 
-    guess (n,): a direction in which they look before: a slider goes on as it went.
+    guess (n,): a direction in which they look before: a slider goes on as it went; overwrite: b may be
     """
-    begin, won, left = np.zeros(len(b)), 0.0, b
+    begin: np.ndarray | float = 0.0
+    won, left = 0.0, b
     if guess is not None and guess.any():
         image = matrix @ guess
         share = (guess @ b) / (guess @ image)
         begin, won, left = share * guess, float(share * (guess @ b)), b - share * image
     falls: list[float] = []
-    for x, _, fallen in islice(gradient_steps(matrix, left, precondition), most + 1):
-        falls.append(won + fallen)
-        if len(falls) > WINDOW and falls[-1] - falls[-1 - WINDOW] <= enough * falls[-1]:
-            return begin + x, True
-    return begin + x, len(falls) <= most
+    for step in islice(gradient_steps(matrix, left, precondition, overwrite or left is not b), most + 1):
+        falls.append(won + step[2])
+        done = len(falls) > WINDOW and falls[-1] - falls[-1 - WINDOW] <= enough * falls[-1]
+        if done:
+            break
+    x = step[0]
+    x += begin
+    return x, done or len(falls) <= most

@@ -119,14 +119,15 @@ def solve_general(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray = "cola
 
 
 def gradient_steps(
-    A: sp.spmatrix, b: np.ndarray, precondition: Callable[[np.ndarray], np.ndarray]
+    A: sp.spmatrix, b: np.ndarray, precondition: Callable[[np.ndarray], np.ndarray], overwrite: bool = False
 ) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
     """Iterates of preconditioned conjugate gradients for A x = b (n,), A symmetric positive definite.
 
     Each is x (n,), the residual b - A x (n,), and how far x.A.x / 2 - b.x has fallen, times two; x and the residual are
     overwritten by the next. Ends where the residual leads nowhere any more, to the precision of the preconditioner.
+    overwrite: b becomes the residual, which for large meshes takes the memory of a map.
     """
-    x, residual, direction = np.zeros(len(b)), b.copy(), np.zeros(len(b))
+    x, residual, direction = np.zeros(len(b)), b if overwrite else b.copy(), np.zeros(len(b))
     power, fallen = 1.0, 0.0
     while True:
         yield x, residual, fallen

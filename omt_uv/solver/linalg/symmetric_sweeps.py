@@ -13,15 +13,17 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
-from ..freed_memory import give_back
+from ..freed_memory import give_back, give_back_often
 from .additive_schwarz import SHIFT, AdditiveSchwarz, affine_motions, hangs_by_few
 from .kept_factor import by_gradients
 from .nested_dissection import kd_parts
 from .sparse import Factor, minimum_degree
-from .vertex_rows import VertexRows
+from .vertex_rows import VertexRows, rows_between
 
 # Vertices of a part: of fewer, the equations of their motions take as long as the sweeps.
 PART_SIZE = 100
+# Motions of which factors in single precision do: in double those of a million vertices take as much memory as these.
+SINGLE_FROM = 30_000
 # Iterations at most; where these are not enough, parts are factored from there on.
 MOST = 100
 
@@ -61,24 +63,31 @@ class SymmetricSweeps:
         plain = bool((along == [1, 1j]).all())
         del along
         give_back()
-        coarse, motions = self._coarse(rows, spread), Motions(spread, plain)
+        total = rows.between(spread)
+        motions = Motions(spread, plain)
+        # Factors ask for what they may need of memory before they know how much that is.
         del spread
         give_back()
+        coarse = self._coarse(total)
+        del total
         precondition = _preconditioner(rows, lambda r: coarse.solve(motions.gathered(r)), motions)
-        found = by_gradients(rows, b.reshape(-1, 2)[order].ravel(), precondition, MOST)
+        give_back()
+        ordered = b.reshape(-1, 2)[order].ravel()
+        found = by_gradients(rows, ordered, precondition, MOST, overwrite=True)
         if found is None:
             return None
         x = np.empty((len(order), 2))
         x[order] = found.reshape(-1, 2)
         return x.ravel()
 
-    def _coarse(self, rows: VertexRows, spread: sp.csr_matrix) -> Factor:
-        """Factors of the equations (6 parts, 6 parts) of the motions spread (2n, 6 parts)."""
-        total = rows.between(spread).tocsc()
+    def _coarse(self, total: sp.csr_matrix) -> Factor:
+        """Factors of the equations (6 parts, 6 parts) of the motions of parts."""
+        total = total.tocsc()
         if self._order is None:
             parts = minimum_degree(total[::6, ::6])
             self._order = (6 * parts[:, None] + np.arange(6)).ravel()
-        return Factor(total + SHIFT * total.diagonal().max() * sp.identity(total.shape[0]), self._order)
+        n = total.shape[0]
+        return Factor(total + SHIFT * total.diagonal().max() * sp.identity(n), self._order, single=n > SINGLE_FROM)
 
 
 class Motions:
@@ -95,14 +104,14 @@ class Motions:
             entries = spread.data.reshape(n, 6)[:, :3].ravel()
             self._spread = sp.csr_matrix((entries, columns, 3 * np.arange(n + 1, dtype=np.int32)), shape=(n, k))
 
-    def of(self, motions: np.ndarray) -> np.ndarray:
-        """What all motions (k,) make of the unknowns, (2n,)."""
+    def of(self, motions: np.ndarray, own: slice) -> np.ndarray:
+        """What all motions (k,) make of the unknowns (v,2) of some vertices that follow each other."""
         if not self._plain:
-            return self._spread @ motions
-        found = np.empty((self._spread.shape[0], 2))
+            return (rows_between(self._spread, 2 * own.start, 2 * own.stop) @ motions).reshape(-1, 2)
+        rows, found = rows_between(self._spread, own.start, own.stop), np.empty((own.stop - own.start, 2))
         for axis, one in enumerate(motions.reshape(-1, 2, 3).transpose(1, 0, 2)):
-            found[:, axis] = self._spread @ one.ravel()
-        return found.ravel()
+            found[:, axis] = rows @ one.ravel()
+        return found
 
     def gathered(self, r: np.ndarray) -> np.ndarray:
         """What is of each motion (k,) in forces r (2n,)."""
@@ -120,17 +129,17 @@ def _preconditioner(
     What earlier colours do to later ones is taken off what is left as they move, what later ones do to earlier ones on
     the way back: either takes half of the matrix.
     """
-    xx, xy, yy = rows.inverse
     colours, more = range(len(rows.of_colours)), rows.more_of_colours is not None
 
     def solve(x: np.ndarray, own: slice, left: np.ndarray) -> None:
         """Move the vertices `own` to where nothing of what is left (v,2) of their rows is."""
-        u, v = left.T
-        x.reshape(-1, 2)[own, 0] = xx[own] * u + xy[own] * v
-        x.reshape(-1, 2)[own, 1] = xy[own] * u + yy[own] * v
+        (xx, xy, yy), (u, v) = rows.inverse(own), left.T
+        x.reshape(-1, 2)[own, 0] = xx * u + xy * v
+        x.reshape(-1, 2)[own, 1] = xy * u + yy * v
 
     def precondition(r: np.ndarray) -> np.ndarray:
-        x, left, beyond = np.zeros(len(r)), r.copy(), np.zeros(len(r))
+        give_back_often(len(r) // 2)
+        x, left, beyond = np.zeros(len(r)), r.copy(), np.zeros(len(r) if more else 0)
         for k in colours:
             own = rows.pattern.rows(k)
             here = left.reshape(-1, 2)[own]
@@ -138,18 +147,21 @@ def _preconditioner(
                 beyond.reshape(-1, 2)[own] = rows.by_more(x, k)
                 here = here - beyond.reshape(-1, 2)[own]
             solve(x, own, here)
-            rows.to_later(x, k, left)
+            rows.to_later(x.reshape(-1, 2)[own], k, left)
+        give_back_often(len(r) // 2)
+        beyond = beyond if more else np.zeros(len(r))
         for k in colours:
             rows.from_later(x, k, beyond)
             if more:
                 beyond.reshape(-1, 2)[rows.pattern.rows(k)] -= rows.by_more(x, k)
         motions = by_parts(beyond)
         del beyond
-        moved = parts.of(motions)
-        x += moved
+        give_back_often(len(r) // 2)
         for k in colours:
+            own = rows.pattern.rows(k)
+            moved = parts.of(motions, own)
+            x.reshape(-1, 2)[own] += moved
             rows.to_later(moved, k, left)
-        del moved
         for k in reversed(colours):
             own = rows.pattern.rows(k)
             rows.from_later(x, k, left)

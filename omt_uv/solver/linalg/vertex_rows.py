@@ -8,7 +8,7 @@ of a vertex share their columns, which halves what these take.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from itertools import pairwise
 
@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import PrecisionError
+from ..freed_memory import give_back_often
 
 # Cells whose pairs of corners are numbered at a time.
 AT_ONCE = 100_000
@@ -27,8 +28,6 @@ class RowPattern:
     order (n,) : vertices by colour, in which all else is numbered; first (colours + 1,) : where each begins
     start (n + 1,) : the first of the b blocks of each vertex with those of later colours
     columns (2b,) : the two columns of each block, counted from the first unknown of the next colour
-    blocks : (c_i, k_i (k_i + 1) / 2) of the pairs of corners of cells, see `corner_pairs`; b + v is that of vertex v
-        with itself, and ~k block k where the second corner comes before the first
     """
 
     def __init__(self, cells: Sequence[np.ndarray], n: int):
@@ -43,25 +42,35 @@ class RowPattern:
         del one, other
         by_row = np.argsort(row.astype(np.int64) * n + column)
         self.start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=n))]).astype(np.int32)
+        del key
         row, column = row[by_row], column[by_row]
+        del by_row
         later = column - self.first[1:].astype(np.int32)[colour[self.order[row]]]
         self.columns = (2 * later[:, None] + np.arange(2, dtype=np.int32)).ravel()
-        del row, column, later
-        number = np.empty(len(key), np.int32)
-        number[by_row] = np.arange(len(key))
-        self.blocks = [np.empty((len(c), len(corner_pairs(c.shape[1])[0])), np.int32) for c in cells]
-        for found, some in zip(self.blocks, cells, strict=True):
-            for begin in range(0, len(some), AT_ONCE):
-                here = slice(begin, begin + AT_ONCE)
-                found[here] = self._blocks_of(some[here], key, number, place)
 
-    def _blocks_of(self, cells: np.ndarray, key: np.ndarray, number: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """The blocks of the pairs of corners of some cells (c,k); number : of the block of each key."""
-        one, other = (cells[:, side] for side in corner_pairs(cells.shape[1]))
-        # The key of a vertex with itself is none: what it comes to is of no use.
-        found = number[np.minimum(np.searchsorted(key, _keys(one, other, len(place))), len(key) - 1)] if len(key) else 0
-        found = np.where(place[one] > place[other], ~found, found)
-        return np.where(one == other, len(key) + place[one], found)
+    def blocks(self) -> Callable[[np.ndarray], np.ndarray]:
+        """What finds the blocks (c, k (k + 1) / 2) of the pairs of corners of some cells (c,k), see `corner_pairs`.
+
+        b + v is that of vertex v with itself, and ~k block k where the second corner comes before the first. Those of
+        all cells at once take as much memory as the mesh.
+        """
+        n, key = len(self.order), np.empty(self.count, np.int64)
+        place = np.empty(n, np.int32)
+        place[self.order] = np.arange(n)
+        for begin, end in pairwise(self.first):
+            # Row by row: they are in order.
+            row = np.repeat(np.arange(begin, end), np.diff(self.start[begin : end + 1]))
+            here = slice(self.start[begin], self.start[end])
+            key[here] = self.columns[::2][here] // 2 + (n * row + end)
+
+        def of(cells: np.ndarray) -> np.ndarray:
+            one, other = (place[cells[:, side]] for side in corner_pairs(cells.shape[1]))
+            # The key of a vertex with itself is none: what it comes to is of no use.
+            found = np.searchsorted(key, _keys(one, other, n)).astype(np.int32)
+            found = np.where(one > other, ~found, found)
+            return np.where(one == other, np.int32(len(key)) + one, found)
+
+        return of
 
     def rows(self, colour: int) -> slice:
         """Which vertices have a colour."""
@@ -80,13 +89,16 @@ def corner_pairs(k: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _colours(key: np.ndarray, n: int) -> np.ndarray:
     """Colours (n,) of n vertices of which those of the keys are neighbours, see `_distinct_keys`."""
-    one, other = np.divmod(key, n)
-    both = np.concatenate([key, other * n + one, np.arange(n, dtype=np.int64) * (n + 1)])
-    del one, other
+    b, both = len(key), np.empty(2 * len(key) + n, np.int64)
+    both[:b], both[2 * b :] = key, np.arange(n) * (n + 1)
+    parts = [slice(k, k + 10 * AT_ONCE) for k in range(0, len(both), 10 * AT_ONCE)]
+    for here in parts:
+        one, other = np.divmod(key[here], n)
+        both[b : 2 * b][here] = other * n + one
     both.sort()
-    tail = (both // n).astype(np.int32)
-    both %= n
-    head = both.astype(np.int32)
+    tail, head = (np.empty(len(both), np.int32) for _ in range(2))
+    for here in parts:
+        tail[here], head[here] = np.divmod(both[here], n)
     del both
     degree = np.bincount(tail, minlength=n)
     return coloured(np.cumsum(degree) - degree, tail, head)
@@ -102,6 +114,7 @@ def coloured(start: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarra
     rank = np.random.default_rng(0).permutation(n).astype(np.int32)
     colour, taken = np.full(n, -1), np.zeros(n, np.int64)
     while True:
+        give_back_often(n)
         left = colour < 0
         if not left.any():
             return colour
@@ -110,11 +123,20 @@ def coloured(start: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarra
         tail, head = tail[kept], head[kept]
         vertex = np.flatnonzero(left)
         begin = np.searchsorted(tail, vertex)
-        won = vertex[np.maximum.reduceat(rank[head], begin) == rank[vertex]]
+        won = vertex[_of_edges(np.maximum, rank, head, begin) == rank[vertex]]
         colour[won] = np.log2(~taken[won] & (taken[won] + 1)).astype(np.int64)
         bit = np.zeros(n, np.int64)
         bit[won] = 1 << colour[won]
-        taken[vertex] |= np.bitwise_or.reduceat(bit[head], begin)
+        taken[vertex] |= _of_edges(np.bitwise_or, bit, head, begin)
+
+
+def _of_edges(reduce: np.ufunc, values: np.ndarray, head: np.ndarray, begin: np.ndarray) -> np.ndarray:
+    """What values (n,) at the heads of edges (e,) come to, (v,), from each of some of these on to the next."""
+    found, cuts = np.empty(len(begin), values.dtype), np.append(begin, len(head))
+    for first in range(0, len(begin), AT_ONCE):
+        some = cuts[first : first + AT_ONCE + 1]
+        found[first : first + AT_ONCE] = reduce.reduceat(values[head[some[0] : some[-1]]], some[:-1] - some[0])
+    return found
 
 
 class VertexRows:
@@ -182,8 +204,7 @@ class VertexRows:
         """What is to be added to the rows (2v,2n) of each colour, beside `inverse`."""
         if self._more is None:
             return None
-        first, second = self._data[:, self.pattern.count :]
-        xx, xy, yy = self._own - np.stack([first[:, 0], first[:, 1], second[:, 1]])
+        xx, xy, yy = self._own - np.stack(self._blocks_of(slice(None)))
         size = np.arange(len(xx) + 1)
         blocks = np.stack([np.stack([xx, xy], axis=1), np.stack([xy, yy], axis=1)], axis=1)
         beside = (self._more - sp.bsr_matrix((blocks, size[:-1], size)).tocsr()).tocsr()
@@ -196,10 +217,10 @@ class VertexRows:
         for axis, rows in enumerate(self.of_colours[colour]):
             own[:, axis] -= rows @ x[len(x) - rows.shape[1] :]
 
-    def to_later(self, x: np.ndarray, colour: int, total: np.ndarray) -> None:
-        """Take what the vertices of a colour, which are at x (2n,), do to those of later colours off a total (2n,)."""
-        own = x.reshape(-1, 2)[self.pattern.rows(colour)]
-        first, second = (rows.T @ own[:, axis] for axis, rows in enumerate(self.of_colours[colour]))
+    def to_later(self, own: np.ndarray, colour: int, total: np.ndarray) -> None:
+        """Take what the vertices of a colour, which are at `own` (v,2), do to those of later colours off a total
+        (2n,)."""
+        first, second = (_turned(rows) @ own[:, axis] for axis, rows in enumerate(self.of_colours[colour]))
         first += second
         total[len(total) - len(first) :] -= first
 
@@ -209,35 +230,42 @@ class VertexRows:
         return np.zeros((own.stop - own.start, 2)) if more is None else (more[colour] @ x).reshape(-1, 2)
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
+        give_back_often(len(self.pattern.order))
         found = np.empty(len(x))
         at, minus = x.reshape(-1, 2), found.reshape(-1, 2)
         for axis, rows in enumerate(self._data[:, self.pattern.count :]):
             minus[:, axis] = -(rows[:, 0] * at[:, 0] + rows[:, 1] * at[:, 1])
         for k in range(len(self.of_colours)):
             self.from_later(x, k, found)
-            self.to_later(x, k, found)
+            self.to_later(at[self.pattern.rows(k)], k, found)
         if self._more is not None:
             found -= self._more @ x
         return np.negative(found, out=found)
 
-    @cached_property
-    def inverse(self) -> np.ndarray:
-        """Inverses of the blocks of vertices with themselves, (3,n): entries xx, xy, yy. Raises PrecisionError."""
-        xx, xy, yy = self._own
+    def inverse(self, own: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Inverses of the blocks of some vertices with themselves: entries (v,) xx, xy, yy. Raises PrecisionError.
+
+        They are found in less time than the rows of these vertices are gone through, and none are kept.
+        """
+        xx, xy, yy = self._blocks_of(own) if self._more is None else self._own[:, own]
         det = xx * yy - xy * xy
         if not (det > 0).all():
             raise PrecisionError("A linear system is singular in double precision")
-        return np.stack([yy / det, -xy / det, xx / det])
+        return yy / det, -xy / det, xx / det
 
-    @property
+    def _blocks_of(self, own: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The blocks of the pattern of some vertices with themselves, entries as in `inverse`, which are not copied."""
+        first, second = self._data[:, self.pattern.count :][:, own]
+        return first[:, 0], first[:, 1], second[:, 1]
+
+    @cached_property
     def _own(self) -> np.ndarray:
         """The blocks of vertices with themselves, (3,n) as in `inverse`.
 
         What is added to the pattern may join vertices of a colour: their blocks are as much greater as makes sweeps
         converge all the same (Baker, Falgout, Kolev, Yang 2011).
         """
-        first, second = self._data[:, self.pattern.count :]
-        xx, xy, yy = first[:, 0].copy(), first[:, 1].copy(), second[:, 1].copy()
+        xx, xy, yy = np.stack(self._blocks_of(slice(None)))
         if self._more is None:
             return np.stack([xx, xy, yy])
         more = self._more.tocoo()
@@ -264,7 +292,7 @@ class VertexRows:
         total = sp.csr_matrix((motions.shape[1],) * 2)
         for k, both in enumerate(self.of_colours):
             own = self.pattern.rows(k)
-            later = _from(motions, 2 * own.stop)
+            later = rows_between(motions, 2 * own.stop, motions.shape[0])
             itself = self._data[:, self.pattern.count :][:, own]
             for axis, rows in enumerate(both):
                 some = motions[2 * own.start + axis : 2 * own.stop : 2].T
@@ -274,6 +302,8 @@ class VertexRows:
                     moved = motions[2 * own.start + other : 2 * own.stop : 2]
                     moved.data *= np.repeat(entries, np.diff(moved.indptr))
                     total = total + some @ moved
+                del some, half, moved
+                give_back_often(len(self.pattern.order))
         return total if self._more is None else total + motions.T @ (self._more @ motions)
 
     def plain(self) -> sp.csc_matrix:
@@ -301,9 +331,16 @@ def _sharing(shape: tuple[int, int], data: np.ndarray, indices: np.ndarray, star
     return found
 
 
-def _from(rows: sp.csr_matrix, first: int) -> sp.csr_matrix:
-    """The rows of a matrix from the first of some on, which are not copied."""
-    start = rows.indptr[first:]
+def _turned(rows: sp.csr_matrix) -> sp.csc_matrix:
+    """The transpose of a matrix, whose entries are not copied either."""
+    found = sp.csc_matrix(rows.shape[::-1])
+    found.data, found.indices, found.indptr = rows.data, rows.indices, rows.indptr
+    return found
+
+
+def rows_between(rows: sp.csr_matrix, first: int, last: int) -> sp.csr_matrix:
+    """The rows of a matrix from one on and before another, which are not copied."""
+    start = rows.indptr[first : last + 1]
     here = slice(start[0], start[-1])
     return _sharing((len(start) - 1, rows.shape[1]), rows.data[here], rows.indices[here], start - start[0])
 

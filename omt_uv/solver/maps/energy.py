@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import Sides, kept_hats
+from ..mesh.geometry import Sides, Sizes, kept_hats
 
 # A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
 SHARE_ERROR = 2.7
@@ -38,7 +38,7 @@ class Quads:
     whether one stands for images that are cut along the other diagonal, too, so that it needs both in every map; both
     (q,) bool, or None for no quad, whose shear is the mean over both triangulations."""
 
-    size: np.ndarray
+    size: np.ndarray | Sizes
     convex: np.ndarray
     crossed: np.ndarray | None = None
     both: np.ndarray | None = None
@@ -46,7 +46,7 @@ class Quads:
     @property
     def part(self) -> np.ndarray:
         """How much (q,4) of the area of the quad each triangle stands for."""
-        return self.size * ([1, 1, 0, 0] if self.both is None else np.where(self.both[:, None], 0.5, [1, 1, 0, 0]))
+        return self.size[:] * ([1, 1, 0, 0] if self.both is None else np.where(self.both[:, None], 0.5, [1, 1, 0, 0]))
 
     def of(self, some) -> Quads:
         """Some of the quads, a slice or (q,) bool."""

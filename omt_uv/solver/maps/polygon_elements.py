@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import cross3, face_areas, hat_gradients, kept_hats, part_by_part
+from ..mesh.geometry import cross3, face_areas, hat_areas, kept_hats, kept_sizes, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
 from ..mesh.topology import distinct
 from .energy import AT_ONCE, Elements, Quads, elements, energies
@@ -111,13 +111,13 @@ def polygon_elements(
     whole = np.bincount(polygon, share * area, mesh.count)
     whole[: len(whole) - q] *= _bent(positions, triangles, faces, mesh)[: len(whole) - q]
     whole[len(whole) - q :] *= _dented(positions, mesh.quads)
-    given = mesh.given(_areas(positions, triangles))
+    given = mesh.given(hat_areas(positions, triangles))
     # Per area of the triangulation given, so that a density of 1 asks for a polygon's own area.
     asked = mesh.given(target) * whole / given
     weight = np.maximum(whole / whole.sum(), asked / asked.sum())
-    inside = None if region is None else mesh.given(region * _areas(positions, triangles)) / given
+    inside = None if region is None else mesh.given(region * hat_areas(positions, triangles)) / given
     lone = area[: len(every) - 4 * q] / whole[polygon[: len(every) - 4 * q]]
-    size = area[len(every) - 4 * q :].reshape(q, 4) / whole[len(whole) - q :, None]
+    size = kept_sizes(hats, area[len(every) - 4 * q :].reshape(q, 4), whole[len(whole) - q :])
     return Elements(
         triangles=every,
         area=whole / whole.sum(),
@@ -169,7 +169,7 @@ def with_convex_quads_of(faces: Elements, area: np.ndarray) -> Elements:
     if faces.quads is None or not len(faces.quads.convex):
         return faces
     whole = area[:, :2].sum(axis=1)
-    both = faces.quads.convex & (area > OPEN * faces.quads.size * whole[:, None]).all(axis=1)
+    both = faces.quads.convex & (area > OPEN * faces.quads.size[:] * whole[:, None]).all(axis=1)
     if faces.quads.crossed is not None:
         both |= faces.quads.crossed
     last = np.zeros(len(both), bool) if faces.quads.both is None else faces.quads.both
@@ -256,7 +256,3 @@ def _convex(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
         return (np.einsum("qtd,qd->qt", normal, own) > CONVEX * (own**2).sum(axis=1)[:, None]).all(axis=1)
 
     return part_by_part(convex, quads)
-
-
-def _areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    return hat_gradients(positions, triangles)[0]

@@ -23,6 +23,8 @@ from .topology import distinct, next_halfedge, pair_keys, previous_halfedge
 
 # Share of a quad's area that the triangle at each of its corners needs for the quad to be cut anew.
 LEAST_CORNER = 1e-3
+# Triangles from which on a surface that is cut anew numbers their corners in half of the memory.
+MANY = 100_000
 
 
 def flip_in_place(triangles: np.ndarray, twin: np.ndarray, h: np.ndarray, carried: np.ndarray | None = None) -> None:
@@ -155,7 +157,9 @@ def cut_along_shorter(surface: Surface) -> Surface:
     turned = longer_diagonals(points, given.reshape(-1, 4), others)
     if not turned.any():
         return surface
-    corners, cut = surface.triangles.ravel()[places[turned]], surface.triangles.copy()
+    # It is kept beside the one that was given.
+    kept = np.int32 if len(owner) > MANY else np.int64
+    corners, cut = surface.triangles.ravel()[places[turned]], surface.triangles.astype(kept)
     cut[places[turned, 0] // 3], cut[places[turned, 1] // 3] = corners[:, [0, 1, 3]], corners[:, [1, 2, 3]]
     return replace(surface, triangles=cut)
 

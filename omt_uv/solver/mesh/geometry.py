@@ -289,6 +289,11 @@ def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
     return _areas_of(sides), part_by_part(gradients_of, sides)
 
 
+def hat_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The areas (m,) that `hat_gradients` has."""
+    return _areas_of(_sides_of(positions, triangles))
+
+
 class Sides:
     """What `gradients_of` makes the gradients of hat functions of, sides (m,3) of triangles (m,3) with corners at
     (n,3). They are let go while other things take all memory there is, and found again, to the bit, when asked for."""
@@ -297,15 +302,47 @@ class Sides:
         self._mesh = positions, triangles
         self._sides: np.ndarray | None = sides
 
+    def __len__(self) -> int:
+        """How many triangles these are of."""
+        return len(self._mesh[1])
+
     def gradient(self, here: slice | np.ndarray) -> np.ndarray:
         """The gradients (k,3) complex of some triangles."""
         if self._sides is None:
             self._sides = _sides_of(*self._mesh)
         return gradients_of(self._sides[here])
 
+    def areas(self, here: slice | np.ndarray) -> np.ndarray:
+        """The areas (k,) of some triangles."""
+        if self._sides is None:
+            self._sides = _sides_of(*self._mesh)
+        return _areas_of(self._sides[here])
+
     def let_go(self) -> None:
         """Hold nothing until it is asked for."""
         self._sides = None
+
+
+class Sizes:
+    """Of the last triangles of some sides, four to each of q quads: their areas over those of the quads, whole (q,),
+    found when asked for."""
+
+    def __init__(self, sides: Sides, whole: np.ndarray):
+        self._sides, self._whole = sides, whole
+
+    def __getitem__(self, some: slice | np.ndarray) -> np.ndarray:
+        """Of some quads, a slice or (q,) bool, (k,4)."""
+        first, quads = len(self._sides) - 4 * len(self._whole), np.arange(len(self._whole))[some]
+        rows: slice | np.ndarray = (first + 4 * quads[:, None] + np.arange(4)).ravel()
+        if isinstance(some, slice) and len(quads) and some.step in (None, 1):
+            # Those that follow each other are not copied.
+            rows = slice(first + 4 * quads[0], first + 4 * quads[-1] + 4)
+        return self._sides.areas(rows).reshape(-1, 4) / self._whole[some, None]
+
+
+def kept_sizes(hats: np.ndarray | Sides, area: np.ndarray, whole: np.ndarray) -> np.ndarray | Sizes:
+    """Areas (q,4) over whole ones (q,), or what makes these where the triangles are many."""
+    return Sizes(hats, whole) if isinstance(hats, Sides) else area / whole[:, None]
 
 
 def kept_hats(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray | Sides]:

@@ -22,6 +22,7 @@ from ..mesh.polygon_areas import polygon_areas
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
+from ..refinement.elimination_order import has_several
 from ..refinement.initial_maps import unroll
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk
@@ -161,7 +162,7 @@ def map_chart(
 
 
 def _refinement_options(disk: DiskMesh, options: MapOptions, start: InitialChartMap, loose: bool) -> RefinementOptions:
-    """How the map of a disk is refined from a start; loose: without pins."""
+    """How the map of a disk is refined from a start; loose: without pins. Quads are ordered as such."""
     return RefinementOptions(
         boundary=disk.boundary,
         balance=options.balance,
@@ -169,7 +170,7 @@ def _refinement_options(disk: DiskMesh, options: MapOptions, start: InitialChart
         warm_start=start.warm and loose,
         prolonged=start.prolonged and loose,
         multiplier=start.multiplier,
-        order=disk.order,
+        order=None if disk.polygons is not None and has_several(disk.polygons) else disk.order,
     )
 
 

@@ -71,7 +71,7 @@ def renumbered(
     uv = np.asarray(uv, float)
     check_initial_map(uv, triangles)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    if polygons is not None and _has_several(polygons):
+    if polygons is not None and has_several(polygons):
         order = mesh_order(vertices, polygon_mesh(triangles, polygons).every_triangle())
     elif order is None:
         order = mesh_order(vertices, triangles)
@@ -92,7 +92,7 @@ def renumbered(
     )
 
 
-def _has_several(polygons: np.ndarray) -> bool:
+def has_several(polygons: np.ndarray) -> bool:
     """Whether some of the triangles (m,) are of one polygon."""
     ordered = np.sort(polygons)
     return bool((ordered[1:] == ordered[:-1]).any())

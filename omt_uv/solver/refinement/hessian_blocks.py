@@ -153,19 +153,21 @@ class RowAssembly:
     ) -> Hessian:
         """The Hessian of the energy, see `hessian_blocks`."""
         give_back_of(len(w))
+        place = np.arange(len(w)) if symmetry is None else symmetry.representative
         gradient, rest, scale = np.zeros(len(w), complex), None, 0.0
 
         def blocks() -> Iterator[tuple[np.ndarray, np.ndarray]]:
             nonlocal rest, scale
-            for some, here, lone, four in in_turn(faces, FEW_AT_ONCE):
+            of_cells = self._pattern.blocks()
+            for some, here, _, _ in in_turn(faces, FEW_AT_ONCE):
                 of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
                 found = _blocks_at_once(some, w, of, kept, axes, symmetry, gradient)
                 scale += found.scale
                 rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
                 if len(found.triangles):
-                    yield self._pattern.blocks[0][lone], found.triangles
+                    yield of_cells(place[some.triangles[: lone_triangles(some)]]), found.triangles
                 if found.quads is not None and len(found.quads):
-                    yield self._pattern.blocks[1][four], found.quads
+                    yield of_cells(place[corners_of_quads(some)]), found.quads
 
         data = VertexRows.summed(self._pattern, blocks())
         gradient = gradient if symmetry is None else symmetry.folded(gradient)

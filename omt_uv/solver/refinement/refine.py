@@ -241,7 +241,7 @@ def _refined(
     initial, notches = _with_notches(initial, mesh, by_triangle, loop, options)
     smoother = _smoother(mesh, faces, balance)
     warm = options.warm_start
-    known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, asked.polygons, faces)
+    known = None if pins is not None else _symmetry(mesh, asked, faces, by_triangle)
     parts = sweeping_solver(mesh.vertices, mesh.triangles)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
@@ -290,13 +290,24 @@ def _refined(
     return found, faces, initial.warnings
 
 
+def _symmetry(mesh: Renumbered, asked: _AreasAsked, faces: Elements, by_triangle: Elements) -> MirrorSymmetry | None:
+    """The mirror symmetry of a mesh, if there is one; what looks for it asks for no gradients, which are let go."""
+    for some in (faces, by_triangle):
+        some.let_go()
+    give_back_of(len(mesh.vertices))
+    found = find_symmetry(mesh.vertices, mesh.triangles, asked.polygons, faces)
+    give_back_of(len(mesh.vertices))
+    return found
+
+
 def _start(mesh: Renumbered, faces: Elements, boundary: str, loop: np.ndarray) -> tuple[InitialMap, np.ndarray]:
     """How the boundary may move, and the map (n,) complex to start from, which notches of disks ask for once more."""
     # A map to areas far from the surface's is sheared by right.
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
     given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
     initial = INITIAL_MAPS[boundary](*given, **_start_options(boundary, faces, far))
-    w = initial.uv @ [1, 1j]
+    # That of the mesh, if it is where it starts, is kept once.
+    w = np.ascontiguousarray(initial.uv, float).view(complex)[:, 0]
     return initial if boundary == "disk" else replace(initial, uv=np.zeros((0, 2))), w
 
 

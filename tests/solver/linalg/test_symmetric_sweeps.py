@@ -91,7 +91,7 @@ def test_what_is_added_may_join_vertices_of_a_colour():
         (3 * rng.normal(size=80), (np.repeat(np.arange(8), 10), (2 * np.array(joined)[:, :, None] + [0, 1]).ravel())),
         shape=(8, 2 * n),
     )
-    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks[0], local)]), forms.T @ forms)
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks()(F), local)]), forms.T @ forms)
     rows.add_diagonal(np.full(2 * n, 0.01))
     b = rng.normal(size=2 * n)
     x = solver.solve(rows, b, V[:, 0] + 1j * V[:, 1], lambda: np.tile([1, 1j], (n, 1)))
@@ -107,7 +107,7 @@ def test_a_sweep_there_parts_and_a_sweep_back_are_those_vertex_by_vertex(joined)
     local = rng.normal(size=(len(F), 6, 6))
     more = sp.random(2 * n, 6, 0.1, "csr", random_state=2) if joined else None
     more = more @ more.T if joined else None
-    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks[0], local @ local.swapaxes(1, 2))]), more)
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks()(F), local @ local.swapaxes(1, 2))]), more)
     rows.add_diagonal(np.full(2 * n, 0.1))
     unknowns = (2 * pattern.order[:, None] + [0, 1]).ravel()
     matrix = rows.plain().toarray()[np.ix_(unknowns, unknowns)]
@@ -216,7 +216,9 @@ def test_motions_of_both_axes_are_kept_once_where_all_vertices_are_free(held):
     spread = schwarz.affine_motions(rng.permutation(np.arange(n) % parts), parts, w, along)
     motions = sweeps.Motions(spread, not held)
     x, r = rng.normal(size=6 * parts), rng.normal(size=2 * n)
-    np.testing.assert_array_equal(motions.of(x), spread @ x)
+    for own in (slice(0, n), slice(4, 21), slice(7, 7)):
+        expected = (spread @ x).reshape(-1, 2)[own]
+        np.testing.assert_array_equal(motions.of(x, own), expected)
     np.testing.assert_array_equal(motions.gathered(r), spread.T @ r)
 
 
