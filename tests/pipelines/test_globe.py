@@ -79,7 +79,7 @@ def test_a_marked_pole_is_the_north():
     pole[7] = 1
     found = drain(project([GlobeJob(triangle_surface(V, F), markers=Markers(pole))], LAMBERT))
     assert found.uv[0][F.ravel()[found.corners[0]] == 7, 1] == pytest.approx(1, abs=1e-6)
-    with pytest.raises(MarkerError):
+    with pytest.raises(MarkerError, match="The marker of the pole is on no part of the"):
         drain(project([GlobeJob(triangle_surface(V, F), markers=Markers(0 * pole))], LAMBERT))
 
 

@@ -101,7 +101,7 @@ def test_wrong_weights_are_refused_with_the_object_and_the_elements(value):
 @pytest.mark.parametrize("source", ["mesh", "uv"])
 def test_no_region_at_all_is_refused(source):
     V, F = meshes.grid(3, 3)
-    with pytest.raises(Refusal):
+    with pytest.raises(Refusal, match="All weights are the same"):
         drain(magnify([region(V, F, np.ones(16), V[:, :2])], MagnifySettings(source=source, **DRAFT)))
 
 
@@ -109,7 +109,7 @@ def test_factors_of_a_cascade_multiply():
     assert whole_factor(MagnifySettings(factor=3.0, cascade=4)) == 81.0
     assert whole_factor(MagnifySettings(factor=1e300, cascade=2)) == np.inf
     for factor in (-1.0, np.nan):
-        with pytest.raises(ShareError):
+        with pytest.raises(ShareError, match="A region cannot have"):
             whole_factor(MagnifySettings(factor=factor))
 
 

@@ -87,9 +87,9 @@ def test_weights_span_the_factor_and_attributes_are_taken_as_they_are():
     assert painted[-1] / painted[0] == pytest.approx(8)
     density = density_of(job(V, F, values + 1), F, RemeshSettings(density="attribute"))
     assert np.array_equal(density, values + 1)
-    with pytest.raises(DensityError):
+    with pytest.raises(DensityError, match="There is nothing to read the density from"):
         density_of(job(V, F), F, RemeshSettings(density="attribute"))
-    with pytest.raises(MeshError):
+    with pytest.raises(MeshError, match="A density is not positive and finite"):
         density_of(job(V, F, values - 1), F, RemeshSettings(density="attribute"))
 
 

@@ -87,7 +87,7 @@ def test_all_together_grow_about_the_middle_of_what_they_cover():
 def test_nothing_to_measure_is_an_error():
     V, F, uv = two_squares()
     for wrong in (reading(V, F), reading(V, F, uv, np.zeros(len(F), bool))):
-        with pytest.raises(EmptyMeshError):
+        with pytest.raises(EmptyMeshError, match="There are no"):
             texel_density([wrong], TEXELS)
-    with pytest.raises(ZeroAreaFaceError):
+    with pytest.raises(ZeroAreaFaceError, match="The faces have no area in space, or none in"):
         texel_density([reading(V, F, 0 * uv)], TEXELS)

@@ -40,7 +40,7 @@ def test_means_are_brought_to_the_middle_of_the_sphere_unless_they_gather_in_one
     a, b = (np.linalg.norm(p[:3, None] - p[None, 3:6], axis=2) for p in (points, found))
     assert a[0, 0] * a[1, 1] / (a[0, 1] * a[1, 0]) == pytest.approx(b[0, 0] * b[1, 1] / (b[0, 1] * b[1, 0]))
     assert np.array_equal(centre_on_sphere(found, mass), found) or np.abs(mass @ found).max() > 1e-16
-    with pytest.raises(errors.PrecisionError):
+    with pytest.raises(errors.PrecisionError, match="The map gathers half of the surface in one"):
         centre_on_sphere(np.tile(points[:1], (5, 1)), np.ones(5))
 
 

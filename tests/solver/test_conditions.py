@@ -80,7 +80,7 @@ def test_quads_are_a_grid_where_they_fill_rows_and_columns_and_nothing_is_beside
         "an edge to itself": (V, np.concatenate([quads[:1], [[1, 1, 5, 5]]])),
     }
     for name, (W, Q) in corners.items():
-        with pytest.raises(errors.GridError):
+        with pytest.raises(errors.GridError, match="The quads of an island"):
             quad_grid.rectangle(W, Q, np.ones(len(Q)))
             pytest.fail(name)
 

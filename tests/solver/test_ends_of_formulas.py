@@ -112,7 +112,7 @@ def test_several_regions_have_their_factors_or_cannot(exact):
     else:
         # Against what has weight 0: each so many times as dense.
         np.testing.assert_allclose(found.density[:3] / found.density[3], [2, 0.5, 1])
-    with pytest.raises(errors.EmptyRegionError):
+    with pytest.raises(errors.EmptyRegionError, match="A region has no area"):
         joint_density(regions, np.where(np.arange(6) == 1, 0, 1.0), [2.0, 0.5, 1.0], exact)
     if exact:
         for factors, words in (([3.0, 3.0, 1.0], "together"), ([5.999999999, 0.5, 1e-9], "together")):

@@ -39,7 +39,7 @@ def test_blocks_of_vertices_are_inverted_where_they_are_positive(value):
     if value > 0:
         assert [x.tolist() for x in rows.inverse(slice(0, 3))] == [[1] * 3, [0] * 3, [1] * 3]
     else:
-        with pytest.raises(errors.PrecisionError):
+        with pytest.raises(errors.PrecisionError, match="A linear system is singular in double"):
             rows.inverse(slice(0, 3))
 
 
@@ -53,7 +53,7 @@ def test_equations_that_stay_singular_are_shifted_until_the_shift_is_that_of_the
                 raise RuntimeError("this goes on forever")
             raise errors.PrecisionError("singular")
 
-    with pytest.raises(errors.PrecisionError):
+    with pytest.raises(errors.PrecisionError, match="Cut the chart into less elongated pieces with"):
         projected_newton._solution(sp.identity(2).tocsc(), np.ones(2), 2.0, Parts(), None, None, None)
     # Each shift is that much larger than the one before, and added to it.
     shifts = np.diff(tried) / 2
@@ -86,7 +86,7 @@ def test_solutions_that_are_not_finite_are_none(entry, value, fits):
     if fits:
         assert factor.solve(np.array([2.0, value])).tolist() == [2.0, value / entry]
     else:
-        with pytest.raises(errors.PrecisionError):
+        with pytest.raises(errors.PrecisionError, match="A linear system is singular in double"):
             factor.solve(np.array([2.0, value]))
 
 
@@ -107,7 +107,7 @@ def test_inverses_are_those_of_matrices_that_are_positive_or_all_but(beside, fit
     matrix = sp.csr_matrix(np.array([[1.0, beside], [beside, 1.0]]))
     free = np.array([2, 0])
     if not fits:
-        with pytest.raises(errors.PrecisionError):
+        with pytest.raises(errors.PrecisionError, match="The matrix of a coarse surface is singular in"):
             predicted_scale._inverse(matrix, free, 3)
         return
     found = predicted_scale._inverse(matrix, free, 3)
@@ -121,7 +121,7 @@ def test_inverses_are_those_of_matrices_that_are_positive_or_all_but(beside, fit
 def test_a_mesh_of_which_nothing_can_go_is_refused(monkeypatch):
     none = np.zeros(0, np.int64)
     monkeypatch.setattr(coarsen, "_choose", lambda *_: (none, none))
-    with pytest.raises(errors.CoarseningError):
+    with pytest.raises(errors.CoarseningError, match="The mesh cannot be made coarser"):
         coarsen._level(np.zeros((9, 3)), OUTWARDS, np.ones(4), None)
 
 
@@ -140,7 +140,7 @@ def test_a_conformal_map_with_faces_too_small_is_refused(height, folds, monkeypa
     found = SimpleNamespace(sites=places, flat=flat, infinite=0)
     steps = sphere_conformal.straightened(places, np.array([[0, 1, 2]]), found)
     if folds:
-        with pytest.raises(errors.PrecisionError):
+        with pytest.raises(errors.PrecisionError, match="Faces of the conformal map are too small for"):
             told(steps)
     else:
         assert told(steps)[0].positions is places
@@ -157,7 +157,7 @@ def test_shares_that_no_density_gives_are_refused():
         contrast = region_density._contrast(region, area, target)
         power = contrast**region
         assert (region @ power) / power.sum() == pytest.approx(target)
-    with pytest.raises(errors.ShareError):
+    with pytest.raises(errors.ShareError, match="No density gives the region this share"):
         region_density._contrast(region, area, 0.9)
 
 
@@ -209,7 +209,7 @@ def test_flat_polygons_are_found_in_so_many_steps_or_not(steps, fits, monkeypatc
         found, fractions = told(run)
         assert found == (0.0, steps) and (np.diff(fractions) >= 0).all() and fractions[-1] == 1
     else:
-        with pytest.raises(errors.PrecisionError):
+        with pytest.raises(errors.PrecisionError, match="too narrow" if steps is None else "did not converge"):
             told(run)
 
 
@@ -280,7 +280,7 @@ def test_windows_grow_where_cells_come_to_their_ends(rounds, monkeypatch):
     problem = SimpleNamespace(mesh=None, mass=None, part=None, asked=None)
     dual = partition_cells.GeodesicDual(problem, None, Pairs(), np.array([1.0, 2, 3, 4]))
     if rounds > 60:
-        with pytest.raises(errors.TransportError):
+        with pytest.raises(errors.TransportError, match="The cells reach beyond every window"):
             dual._within_windows(None, cells_of(0))
         return
     dual._within_windows(None, cells_of(0))

@@ -110,7 +110,7 @@ def test_a_polar_map_puts_every_vertex_into_the_middle_of_its_cell(cornered, fol
 
 
 def test_a_polar_map_has_a_convex_domain():
-    with pytest.raises(BoundaryError):
+    with pytest.raises(BoundaryError, match="A polar factorisation needs a convex domain"):
         told(named_maps.polar_map(NamedProblem(V, F, np.ones(8))))
 
 

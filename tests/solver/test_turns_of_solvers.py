@@ -73,7 +73,7 @@ def test_bodies_without_a_size_are_filled_as_they_are(size, monkeypatch):
     monkeypatch.setattr(envelope, "_tetwild", nothing)
     V = size * np.array([[0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 12.0]]) + [1, 2, 3]
     F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    with pytest.raises(envelope.TetrahedraError):
+    with pytest.raises(envelope.TetrahedraError, match="The surface encloses nothing"):
         envelope.filled(V, F, 100)
     points, edge = asked[0]
     assert np.isfinite(points).all() and points.max() == pytest.approx(12 / 13 if size else 0.0)

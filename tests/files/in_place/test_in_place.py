@@ -215,7 +215,7 @@ def test_compressed_files_are_refused_by_name(name):
 @pytest.mark.parametrize("put, data", [(obj.put, mesh_bytes.obj_bytes()), (ply.put, mesh_bytes.ply_bytes())])
 def test_another_mesh_is_refused(put, data):
     for faces, positions in ((QUADS[:, ::-1], CUBE), (QUADS, CUBE[:, ::-1] * 2 + np.arange(24).reshape(8, 3))):
-        with pytest.raises(InPlaceError):
+        with pytest.raises(InPlaceError, match="Blender has faces that are none of the file's"):
             put(data, [mesh_bytes.imported(faces, mesh_bytes.spread(24), positions.astype(np.float32))])
 
 

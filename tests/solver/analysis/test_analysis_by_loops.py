@@ -87,7 +87,7 @@ def test_factors_are_positive_and_finite(factor, good):
     if good:
         density.check_factor(factor)
     else:
-        with pytest.raises(ShareError):
+        with pytest.raises(ShareError, match="A region cannot have"):
             density.check_factor(factor)
 
 

@@ -51,7 +51,7 @@ def test_painted_weights():
 @pytest.mark.parametrize("factor", [0.0, -2.0, np.nan, np.inf])
 def test_factors_that_are_none(factor):
     for call in (painted_density, lambda w, m: exact_density(w, np.ones(2), m)):
-        with pytest.raises(ShareError):
+        with pytest.raises(ShareError, match="A region cannot have"):
             call(np.array([0, 1.0]), factor)
 
 

@@ -60,7 +60,7 @@ def test_what_does_not_go_is_refused_with_factors_that_do(painted):
 
 def test_weights_and_factors_that_are_none_are_refused(painted):
     regions, area = painted
-    with pytest.raises(WeightError):
+    with pytest.raises(WeightError, match="All weights are zero"):
         joint_density(np.array([regions[0], 0 * regions[0]]), area, [2, 2])
-    with pytest.raises(ShareError):
+    with pytest.raises(ShareError, match="A region cannot have"):
         joint_density(regions, area, [2, -1, 2])

@@ -126,7 +126,7 @@ def test_what_is_no_grid_is_refused():
     V, quads, _ = grid(3, 3)
     for chosen in (quads[:-1], quads[[0, 1, 2, 3, 5, 6, 7, 8]]):
         used, local = np.unique(chosen, return_inverse=True)
-        with pytest.raises(GridError):
+        with pytest.raises(GridError, match="The quads of an island are not in rows and"):
             rectangle(V[used], local.reshape(-1, 4), np.ones(len(chosen)))
     ring = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]])
     with pytest.raises(GridError, match="ring"):

@@ -111,9 +111,9 @@ def test_distances_to_a_surface():
 
 def test_what_cannot_be_compared_is_refused_by_name():
     V, F = grid(2)
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="There are no faces to compare"):
         drain(compare((V, F), (V, F[:0]), 4000))
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="There are no faces to compare"):
         drain(compare((V, np.array([[0, 0, 1]])), (V, F), 4000))
     V = V.copy()
     V[3] = np.nan

@@ -172,7 +172,7 @@ def test_what_is_no_surface_is_refused(monkeypatch):
             drain(compare(one, other, 10))
         assert np.asarray(error.value.elements).tolist() == [4]
     for nothing in ((V, F[:0]), (V * 0, F)):
-        with pytest.raises(EmptyMeshError):
+        with pytest.raises(EmptyMeshError, match="There are no faces to compare"):
             drain(compare((V, F), nothing, 10))
     with_more = np.concatenate([[[99.0, 99, 99]], V])
     loose = drain(compare((with_more, F + 1), (V, F), 100))

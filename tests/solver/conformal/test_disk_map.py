@@ -220,7 +220,7 @@ def test_rectangle_to_disk_is_scipys_elliptic_sine():
 
 
 def test_a_too_long_rectangle_is_refused():
-    with pytest.raises(errors.PrecisionError):
+    with pytest.raises(errors.PrecisionError, match="The conformal map leaves double precision"):
         rectangle_to_disk(np.zeros((1, 2)), 50.0)
 
 

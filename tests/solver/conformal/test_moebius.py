@@ -53,5 +53,5 @@ def test_what_is_centred_stays(points):
 
 
 def test_half_of_the_mass_in_one_point_has_no_centre(points):
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="The map gathers half of the surface in one"):
         centre_on_sphere(points, np.where(np.arange(100) == 3, 200.0, 1.0))

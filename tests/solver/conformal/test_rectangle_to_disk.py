@@ -44,7 +44,7 @@ def test_corners_of_a_square_are_a_quarter_of_the_circle_apart():
 
 @pytest.mark.parametrize("height", [1.01 * MAX_ASPECT, 0.99 / MAX_ASPECT])
 def test_long_rectangles_are_an_error(height):
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="The conformal map leaves double precision"):
         rectangle_to_disk(points(height), height)
 
 

@@ -80,7 +80,7 @@ SURFACES = {
 
 @pytest.mark.parametrize("mesh", [moebius, projective_plane])
 def test_no_seam_alone_opens_what_has_one_side_only(mesh):
-    with pytest.raises(OrientationError):
+    with pytest.raises(OrientationError, match="Neighbouring faces point to opposite sides"):
         cut_to_disks(triangle_surface(*mesh()), seams="existing")
 
 

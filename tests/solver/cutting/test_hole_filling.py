@@ -183,7 +183,7 @@ def test_the_marked_seams_of_a_sieve_are_enough(body):
 
 def test_seams_of_a_sieve_that_leave_a_tube_are_refused():
     V, F = tube(32, 24, lattice(4, 2))
-    with pytest.raises(NotADiskError):
+    with pytest.raises(NotADiskError, match="A chart has"):
         cut_to_disks(triangle_surface(V, F), seams="existing", sieve=32)
 
 

@@ -46,7 +46,7 @@ def test_walls_of_a_ball_are_all_around_it(dimension, samples):
     assert np.linalg.norm(held - middle, axis=1) == pytest.approx([2.5, 0.1, 2.5])
     assert held[0] - middle == pytest.approx((outside - middle)[0] * 2.5 / np.linalg.norm((outside - middle)[0]))
     for bad in ((middle * np.nan, 1.0), (middle, np.inf), (middle, 0.0), (middle, -1.0)):
-        with pytest.raises(NonFiniteError):
+        with pytest.raises(NonFiniteError, match="The ball has no finite middle and radius"):
             ball_domain(*bad)
 
 

@@ -122,7 +122,7 @@ def test_nothing_leaves_a_ball_and_little_a_mesh():
     disk = ball_domain(np.zeros(2), 1.0, 60)
     np.testing.assert_allclose(np.linalg.norm(disk.points, axis=1), 1.0)
     np.testing.assert_allclose(disk.held(np.array([[3.0, 0]])), [[1.0, 0]])
-    with pytest.raises(NonFiniteError):
+    with pytest.raises(NonFiniteError, match="The ball has no finite middle and radius"):
         ball_domain(np.zeros(3), np.nan)
     with pytest.raises(HandleError, match="no faces"):
         mesh_domain(np.zeros((3, 3)), np.array([[0, 1, 2]]))

@@ -72,7 +72,7 @@ def test_handles_are_thinned_out_evenly_and_checked():
         check_handles((other,), 3)
     with pytest.raises(HandleError, match="has no points"):
         check_handles((FlowHandle(cloud, cloud[:3]),), 3)
-    with pytest.raises(NonFiniteError):
+    with pytest.raises(NonFiniteError, match="Coordinates of the handle number"):
         check_handles((FlowHandle(cloud * np.nan, cloud),), 3)
 
 

@@ -89,7 +89,7 @@ def test_parts_of_a_slider_are_taken_as_before_while_the_pattern_is_the_same():
 def test_singular_parts_are_named():
     _, parted, w = flattened("free")
     matrix = sp.csc_matrix((2 * len(w), 2 * len(w)))
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="A linear system is singular in double"):
         parted.assembly.parts.solve(matrix, np.ones(2 * len(w)), w, lambda: np.ones((len(w), 2), complex))
 
 

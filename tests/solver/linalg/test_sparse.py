@@ -76,9 +76,9 @@ def test_unsymmetric_dominant_systems():
 
 
 def test_a_singular_matrix_is_named():
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="A linear system is singular in double"):
         solve_spd(sp.csc_matrix((3, 3)), np.ones(3))
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="A linear system is singular in double"):
         solve_spd(sp.diags([1.0, np.nan, 1.0]), np.ones(3))
 
 

@@ -155,7 +155,7 @@ def test_singular_equations_are_named():
     _, swept, w = flattened("free")
     pattern = swept.assembly._pattern
     rows = VertexRows(pattern, VertexRows.summed(pattern, []))
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="A linear system is singular in double"):
         swept.assembly.parts.solve(rows, np.ones(2 * len(w)), w, lambda: np.ones((len(w), 2), complex))
 
 

@@ -158,16 +158,16 @@ def test_figures_do_not_depend_on(transform):
 def test_bad_input_is_a_named_error():
     V, F = meshes.grid(2, 2)
     uv = flat(V, F)
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="There are no faces to measure"):
         distortion(V, F[:0], uv[:0])
     broken = uv.copy()
     broken[3, 1, 0] = np.nan
     with pytest.raises(NonFiniteError) as caught:
         distortion(V, F, broken)
     assert caught.value.kind == "face" and caught.value.elements.tolist() == [3]
-    with pytest.raises(NonFiniteError):
+    with pytest.raises(NonFiniteError, match="A position is not a finite number"):
         distortion(np.where(np.arange(len(V))[:, None] == 4, np.inf, V), F, uv)
-    with pytest.raises(ZeroAreaFaceError):
+    with pytest.raises(ZeroAreaFaceError, match="No face has an area"):
         distortion(V * [1, 0, 0], F, uv)
     with pytest.raises(ValueError, match="expected F"):
         distortion(V, F, uv[:, :2])

@@ -277,7 +277,7 @@ def test_vertices_are_let_go_from_sides_along_which_edges_run(seed):
     try:
         expected = letting_go(sorted(edges), side.tolist(), corner.tolist())
     except FoldedUVError:
-        with pytest.raises(FoldedUVError):
+        with pytest.raises(FoldedUVError, match="Two corners of the square are joined by an"):
             tutte.released_vertices(triangles, loop, side, corner, n, quads)
         return
     found = tutte.released_vertices(triangles, loop, side, corner, n, quads)

@@ -315,7 +315,7 @@ def test_triangles_are_lines_below_a_share_of_their_longest_side_squared(height,
 
 def test_surfaces_to_unwrap_are_somewhere():
     V, F = meshes.grid(2, 1)
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="There are no faces to unwrap"):
         surface.chosen_triangles(triangle_surface(V, F), np.zeros(len(F), bool))
     V = V.copy()
     V[F[0][0], 1] = np.nan

@@ -245,7 +245,7 @@ def test_vertices_that_nothing_uses_do_not_matter():
 
 def test_what_no_repair_helps():
     V, F = meshes.bumpy(4, 4)
-    with pytest.raises(errors.EmptyMeshError):
+    with pytest.raises(errors.EmptyMeshError, match="There are no faces to unwrap"):
         cut_to_disks(triangle_surface(V, F[:0]))
     V[7] = np.nan
     with pytest.raises(errors.NonFiniteError) as caught:
@@ -303,7 +303,7 @@ def test_a_refused_chart_that_touches_itself_is_offered_a_weld():
     V, F = meshes.torus()
     around = np.arange(12)
     W, G = opened(V, F, np.column_stack([around, np.roll(around, -1)]))
-    with pytest.raises(errors.TouchingBoundariesError):
+    with pytest.raises(errors.TouchingBoundariesError, match="A chart has"):
         cut_to_disks(triangle_surface(W, G), seams="existing")
 
 

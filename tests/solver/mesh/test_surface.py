@@ -56,9 +56,9 @@ def test_only_chosen_faces_are_judged():
         strict_gluing(surface, good)
     assert caught.value.elements.tolist() == [len(F) - 1]
     good[-1] = False
-    with pytest.raises(DuplicateFaceError):
+    with pytest.raises(DuplicateFaceError, match="Faces share all their vertices with another"):
         strict_gluing(surface, good)
     good[-2] = False
     assert len(strict_gluing(surface, good).triangles) == good.sum()
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="There are no faces to unwrap"):
         strict_gluing(surface, np.zeros(len(F), bool))

@@ -428,7 +428,7 @@ def test_charts_without_a_map_are_counted_or_their_error_is_raised():
     assert unwrapping.cut_for_a_map([fine, fine], [fine]) == []
     assert unwrapping.cut_for_a_map([none, fine], [fine])[0].startswith("An island along its seams has no map")
     assert unwrapping.cut_for_a_map([none, none], [fine])[0].startswith("2 islands along their seams have no map")
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="Cut the chart into less elongated pieces with"):
         unwrapping.cut_for_a_map([none], [fine, none])
 
 

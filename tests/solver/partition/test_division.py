@@ -131,11 +131,11 @@ def test_what_cannot_be_divided_is_named():
         drain(divide(V, F, 1))
     with pytest.raises(errors.CountError, match="none"):
         drain(divide(V, F, 0))
-    with pytest.raises(errors.EmptyMeshError):
+    with pytest.raises(errors.EmptyMeshError, match="There are no faces to divide"):
         drain(divide(V, F[:0], 3))
     with pytest.raises(errors.EmptyMeshError, match="no area"):
         drain(divide(V * [1, 0, 0], F, 3))
-    with pytest.raises(errors.DensityError):
+    with pytest.raises(errors.DensityError, match="A density is not positive and finite"):
         drain(divide(V, F, 3, np.zeros(len(F))))
     V[3] = np.nan
     with pytest.raises(errors.NonFiniteError, match="1 vertex: 3"):

@@ -279,5 +279,5 @@ def test_divisions_move_their_sites_as_often_as_they_are_asked(count, relax, mon
             want.append(("solve", 1e-5 if k == relax else 0.1))
             want += [("means", "solved")] * (k < relax)
     assert calls == want and steps == 5 * sum(c[0] == "solve" for c in want) and area == 4.0
-    with pytest.raises(CountError):
+    with pytest.raises(CountError, match="cells are none"):
         drain(division.divide(V, F, 0))

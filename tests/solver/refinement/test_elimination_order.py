@@ -43,7 +43,7 @@ def test_errors_get_the_names_of_the_caller():
 
 def test_maps_without_area_are_refused():
     V, F = meshes.grid(3, 3)
-    with pytest.raises(FoldedUVError):
+    with pytest.raises(FoldedUVError, match="The UVs to refine have no area"):
         renumbered(V, F, np.zeros((len(V), 2)), None)
 
 

@@ -150,7 +150,7 @@ def test_maps_that_no_refinement_can_start_from_are_refused():
     check_initial_map(V[:, :2], F)
     check_initial_map(V[:, :2] * [-1, 1], F)
     for wrong in (0 * V[:, :2], V[:, [0, 0]], np.where(np.arange(len(V))[:, None] == 7, np.nan, V[:, :2])):
-        with pytest.raises(FoldedUVError):
+        with pytest.raises(FoldedUVError, match="The UVs to refine"):
             check_initial_map(wrong, F)
     with pytest.raises(FoldedUVError, match="repair"):
         check_initial_map(np.abs(V[:, :2] - 0.5), F)

@@ -421,9 +421,9 @@ def test_a_bad_density_is_named(bad):
 
 def test_uvs_without_area_are_named():
     V, F = meshes.grid()
-    with pytest.raises(FoldedUVError):
+    with pytest.raises(FoldedUVError, match="The UVs to refine have no area"):
         run(V, F, np.zeros((len(V), 2)))
-    with pytest.raises(FoldedUVError):
+    with pytest.raises(FoldedUVError, match="The UVs to refine have no area"):
         run(V, F, np.repeat(V[:, :1], 2, axis=1))
     broken = V[:, :2].copy()
     broken[3] = np.nan

@@ -371,7 +371,7 @@ def test_corners_go_to_the_nearest_vertices_and_order_stays():
     # All at one corner: spread evenly.
     crowded, corner = initial_maps._snap_corners(np.linspace(0, 0.01, 8))
     assert corner.sum() == 4 and sorted(np.floor(crowded + 1e-9).tolist()) == [0, 0, 1, 1, 2, 2, 3, 3]
-    with pytest.raises(FoldedUVError):
+    with pytest.raises(FoldedUVError, match="A chart with fewer than four boundary vertices"):
         initial_maps._snap_corners(np.arange(3.0))
 
 

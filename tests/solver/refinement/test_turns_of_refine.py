@@ -258,7 +258,7 @@ def test_pins_need_a_free_boundary_and_targets_are_scaled_to_the_surface():
     assert refinement._targets(area, None) is area
     found = refinement._targets(area, np.arange(1.0, len(F) + 1))
     assert found.sum() == pytest.approx(area.sum()) and found / found[0] == pytest.approx(np.arange(1.0, len(F) + 1))
-    with pytest.raises(MeshError):
+    with pytest.raises(MeshError, match="A density is not positive and finite"):
         refinement._targets(area, np.zeros(len(F)))
 
 

@@ -109,7 +109,7 @@ def test_a_mirror_image_is_matched_mirrored():
     assert np.linalg.norm(found.forward.positions(W, G) - W, axis=1).max() < 0.02
     back = found.backward.positions(V, F)
     assert np.linalg.norm(back - V, axis=1).max() < 0.02
-    with pytest.raises(HandednessError):
+    with pytest.raises(HandednessError, match="The landmarks of the source are a mirror image"):
         match((V, F), (W, G), (chosen, chosen))
 
 
@@ -153,7 +153,7 @@ def test_bad_input_is_named():
         match((V, F), disk, domain="disk")
     with pytest.raises(SeveralComponentsError, match="2 parts"):
         match((np.concatenate([V, V + 5]), np.concatenate([F, F + len(V)])), (V, F))
-    with pytest.raises(OrientationError):
+    with pytest.raises(OrientationError, match="Neighbouring faces of the source have opposite"):
         match((V, np.concatenate([F[:5, ::-1], F[5:]])), (V, F))
     with pytest.raises(LandmarkError, match="2 landmarks on the source and 1"):
         match((V, F), (V, F), (chosen[:2], chosen[:1]))

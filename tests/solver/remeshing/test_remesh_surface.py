@@ -298,11 +298,11 @@ def test_the_same_warnings_are_summed_up():
 
 def test_bad_input_is_named():
     V, F = meshes.bumpy(6, 6)
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="There are no faces to unwrap"):
         run(V, F[:0], 100)
-    with pytest.raises(NonFiniteError):
+    with pytest.raises(NonFiniteError, match="Coordinates are not finite numbers"):
         run(np.where(np.arange(len(V))[:, None] == 3, np.nan, V), F, 100)
-    with pytest.raises(DensityError):
+    with pytest.raises(DensityError, match="A density is not positive and finite"):
         run(V, F, 100, density=np.zeros(len(F)))
 
 
@@ -315,7 +315,7 @@ def test_one_sided_surfaces_are_refused():
     a, b = k, k + 40
     c, d = np.append(k[1:], 40), np.append(k[1:] + 40, 0)
     F = np.concatenate([np.column_stack([a, c, b]), np.column_stack([c, d, b])])
-    with pytest.raises(OrientationError):
+    with pytest.raises(OrientationError, match="A part of the mesh has only one side, like a"):
         run(V, F, 100)
 
 

@@ -82,7 +82,7 @@ def test_what_has_no_place_for_markers_is_named():
     V, F, centre, start = face()
     with pytest.raises(errors.LandmarkError, match="lies on the boundary"):
         drain(marked_signature(V, F, start, start, COUNT))
-    with pytest.raises(errors.EmptyMeshError):
+    with pytest.raises(errors.EmptyMeshError, match="There are no faces to compare"):
         drain(marked_signature(V, F[:0], centre, start, COUNT))
     whole = drain(signature(*sphere_shapes.blob(seed=0), COUNT))
     with pytest.raises(errors.LandmarkError, match="markers"):

@@ -140,7 +140,7 @@ def test_the_foremost_starts_are_refined_on_few_points_then_on_all_and_the_best_
     assert [x[2] for x in asked] == [0, 1, 2, 3, 4, 5, 102, 101, 1101]
     assert [x[3] for x in asked] == [1] * 8 + [2]
     disk = SimpleNamespace(full=SimpleNamespace(on_disk=True), few="few")
-    with pytest.raises(LandmarkError):
+    with pytest.raises(LandmarkError, match="One shape has markers and the other has none"):
         wasserstein._least(a, disk, 0.1)
     monkeypatch.setattr(wasserstein, "_least_on_disk", lambda *given: given)
     assert wasserstein._least(disk, disk, 0.1) == (disk.full, disk.full, 0.1)
@@ -234,7 +234,7 @@ def test_what_is_divided_has_mass():
     whole, _ = division._problem(V, F, 4, None)
     assert problem.mass == pytest.approx(2 * whole.mass) and counts.tolist() == [4]
     assert problem.asked == pytest.approx(np.full(4, problem.mass.sum() / 4))
-    with pytest.raises(EmptyMeshError):
+    with pytest.raises(EmptyMeshError, match="The faces have no area to divide"):
         division._problem(0 * V, F, 4, None)
 
 

@@ -105,7 +105,7 @@ def test_what_is_pinched_or_inside_out_is_compared_all_the_same():
 def test_handles_are_named():
     with pytest.raises(errors.NotASphereError, match="handle"):
         drain(signature(*meshes.torus(), COUNT))
-    with pytest.raises(errors.EmptyMeshError):
+    with pytest.raises(errors.EmptyMeshError, match="There are no faces to compare"):
         drain(signature(np.zeros((0, 3)), np.zeros((0, 3), int)))
 
 

@@ -169,7 +169,7 @@ def test_vertices_come_back_where_the_smallest_face_around_is_largest():
     back = multilevel._reinserted(level, ring)
     np.testing.assert_allclose(back[:7], ring)
     np.testing.assert_allclose(back[7], found)
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="Faces are too small for double precision on"):
         multilevel._reinserted(SimpleNamespace(**{**vars(level), "triangles": faces[:, ::-1]}), ring)
 
 

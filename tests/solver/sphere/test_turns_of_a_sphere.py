@@ -120,7 +120,7 @@ def test_without_a_transport_it_goes_from_coarse_to_fine(failing, error, mapped)
 
 
 def test_what_has_no_precision_while_it_is_refined_is_an_error(mapped):
-    with pytest.raises(PrecisionError):
+    with pytest.raises(PrecisionError, match="Cut the chart into less elongated pieces with"):
         mapped(first=PrecisionError("no"))
 
 

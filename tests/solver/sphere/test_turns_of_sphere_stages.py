@@ -140,7 +140,7 @@ def test_symmetric_maps_are_taken_where_they_have_their_areas_or_others_have_not
 
 def test_starts_that_stay_folded_are_refused(monkeypatch):
     monkeypatch.setattr(spheres, "untangle_on_sphere", lambda faces, assembly, p: worked((-p, 4)))
-    with pytest.raises(FoldedUVError):
+    with pytest.raises(FoldedUVError, match="Folds of the transport map could not be"):
         drain(spheres.sphere_refine(V, F, V, np.ones(len(F))))
     with pytest.raises(ValueError, match="balance"):
         next(spheres.sphere_refine(V, F, V, np.ones(len(F)), balance=1.5))

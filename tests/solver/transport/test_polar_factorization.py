@@ -94,7 +94,7 @@ def test_a_measure_preserving_map_is_its_own_first_factor(case):
 
 def test_bad_masses_are_named(case):
     sites, mass, domain = case
-    with pytest.raises(TransportError):
+    with pytest.raises(TransportError, match="Transport needs positive, finite masses"):
         drain(polar_factorisation(sites, np.where(np.arange(len(mass)) == 3, -1.0, mass), domain))
     with pytest.raises(ValueError, match="balance"):
         drain(polar_factorisation(sites, mass, domain, -0.1))

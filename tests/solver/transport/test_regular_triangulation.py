@@ -60,5 +60,5 @@ def test_new_names_for_the_sites():
 
 
 def test_sites_on_a_line_have_no_triangulation():
-    with pytest.raises(TransportError):
+    with pytest.raises(TransportError, match="The sites of the transport lie on one line or"):
         by_hull(np.column_stack([np.arange(5.0), np.zeros(5)]), np.zeros(5))

@@ -60,5 +60,5 @@ def test_flips_and_hull_agree(sites, site_weights):
 
 
 def test_sites_on_half_of_the_sphere_have_no_cells(sites):
-    with pytest.raises(TransportError):
+    with pytest.raises(TransportError, match="The sites of the transport leave half of the"):
         by_hull(np.abs(sites), np.zeros(90))

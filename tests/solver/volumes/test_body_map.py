@@ -197,7 +197,7 @@ def test_a_body_with_a_thin_wall_is_mapped(domain):
 
 def test_bad_input_is_named_and_has_a_remedy(monkeypatch):
     V, F = icosphere(2)
-    with pytest.raises(OpenSurfaceError):
+    with pytest.raises(OpenSurfaceError, match="The surface is not closed"):
         drain(volume_map(V, F[1:]))
     a, b = np.meshgrid(np.arange(12), np.arange(8), indexing="ij")
     corner = lambda i, j: (i % 12) * 8 + j % 8  # noqa: E731

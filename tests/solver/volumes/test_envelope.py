@@ -46,7 +46,7 @@ def test_what_cannot_be_filled_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pytetwild", None)
     with pytest.raises(LibraryError, match="pip install pytetwild"):
         filled(V, F)
-    with pytest.raises(NonFiniteError):
+    with pytest.raises(NonFiniteError, match="Coordinates are not finite numbers"):
         filled(np.where(np.arange(len(V))[:, None] == 3, np.nan, V), F)
     nothing = np.zeros((0, 3)), np.zeros((0, 4), int)
     monkeypatch.setattr(envelope, "_tetwild", lambda *_: nothing)

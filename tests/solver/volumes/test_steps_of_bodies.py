@@ -364,7 +364,7 @@ def test_landmarks_that_meet_are_left_where_they_are(apart, flows, monkeypatch):
         ((points, handles, options),) = asked
         assert np.array_equal(points, np.concatenate([positions, landmarks])) and options.radius == 0.25
         assert [h.name for h in handles] == ["landmark 0", "landmark 1", "landmark 2"]
-    with pytest.raises(HandleError):
+    with pytest.raises(HandleError, match="A registration needs three landmarks or more,"):
         drain(registration.registered(positions, landmarks, goals[:2]))
 
 

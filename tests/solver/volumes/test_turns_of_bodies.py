@@ -44,7 +44,7 @@ def test_bodies_are_untangled_refined_and_made_exact(domain, tangled, given, mon
     monkeypatch.setattr(body_map, "exact_volumes", step("exact", exact))
     steps = body_map._mapped(mesh, sphere, domain, "newton", given)
     if tangled and given:
-        with pytest.raises(TetrahedraError):
+        with pytest.raises(TetrahedraError, match="Remesh the surface evenly first"):
             told(steps)
         return
     (found, positions, count), fractions = told(steps)

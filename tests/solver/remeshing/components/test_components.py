@@ -56,5 +56,5 @@ def test_one_sided_surfaces_are_refused():
     V = np.column_stack([np.cos(ring), np.sin(ring), ring / 7])
     # The least Moebius strip: five triangles on five vertices.
     F = np.array([[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 0], [4, 0, 1]])
-    with pytest.raises(OrientationError):
+    with pytest.raises(OrientationError, match="A part of the mesh has only one side, like a"):
         split_components(V[:5], F, NONE)
