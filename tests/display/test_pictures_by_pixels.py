@@ -192,6 +192,29 @@ def test_cells_of_the_checker_have_their_tints_and_circles(size):
         assert np.abs(np.abs(place[off > 0.1] - 0.5) - 0.4).max() < 0.1 and (off > 0.1).any()
 
 
+@pytest.mark.parametrize("size, named", [(256, True), (192, True), (191, False)])
+def test_every_cell_of_the_checker_has_its_name_where_it_can_be_read(size, named, monkeypatch):
+    drawn = {}
+
+    def write(picture, text, x, y, height, colour, anchor):
+        drawn[text] = x / cell, y / cell, height / cell, anchor
+        at = int(y - 0.12 * cell), int(x)
+        np.testing.assert_allclose(colour, colorsys.hsv_to_rgb(*inks(*at)), atol=1e-6)
+
+    def inks(row, column):
+        i, j = int(row / cell), int(column / cell)
+        dark = (i + j) % 2 == 1
+        return (i * 8 + j * 3) % 64 / 64, 0.05 if dark else 0.55, 1.0 if dark else 0.45
+
+    cell = size / 8
+    monkeypatch.setattr(patterns, "write", write)
+    patterns.labelled_checker(size)
+    expected = {f"{'ABCDEFGH'[i]}{j + 1}": (j + 0.5, i + 0.62, 1 / 3, "middle") for i in range(8) for j in range(8)}
+    assert set(drawn) == (set(expected) if named else set())
+    for name, place in drawn.items():
+        assert place[3] == "middle" and place[:3] == pytest.approx(expected[name][:3])
+
+
 def test_circles_touch_six_others_and_have_gaps_between():
     size = 140
     picture = patterns.circle_packing(size)
