@@ -116,3 +116,28 @@ def test_every_island_has_its_turn_however_short_the_slices(session):
         if moved[:half].any() and moved[half:].any():
             return
     raise AssertionError("one island took all the time")
+
+
+@pytest.mark.parametrize("ends_after, changed", [(0, 1), (1, 2), (99, 2)])
+def test_a_slice_takes_islands_in_turn_until_it_is_over(package, session, monkeypatch, ends_after, changed):
+    """By a clock that stands still for so many islands, and is beyond the end then."""
+    objects = [plain("A"), plain("B")]
+    before = [scenes.uv_of(obj) for obj in objects]
+    live, asked = session(*objects), []
+
+    class Clock:
+        def monotonic(self):
+            return 100.0 if sum(asked) > ends_after else 0.0
+
+    for island in live._islands:
+        follow = island.live_map.follow
+
+        def counted(*given, follow=follow):
+            asked.append(1)
+            return follow(given[0], given[1], 1.0)
+
+        monkeypatch.setattr(island.live_map, "follow", counted)
+    monkeypatch.setattr(package("session.live"), "time", Clock())
+    assert live.follow(0.3, 50.0)
+    moved = [not np.array_equal(scenes.uv_of(obj), uv) for obj, uv in zip(objects, before, strict=True)]
+    assert len(asked) == sum(moved) == changed
