@@ -600,6 +600,15 @@ def test_figures_of_a_region_are_those_of_its_triangles():
     assert whole.perimeter == pytest.approx(4 + 1 + 2 + np.sqrt(5)) and whole.uv_diameter == pytest.approx(np.sqrt(10))
 
 
+@pytest.mark.parametrize("corners", [3, 40, 499, 500, 999, 1000, 2400])
+def test_diameters_of_round_outlines_are_their_longer_axes(corners):
+    """However many corners are compared at a time."""
+    angle = 2 * np.pi * np.arange(corners) / corners
+    points = np.column_stack([3 * np.cos(angle), np.sin(angle)]) + [5, -7]
+    apart = np.linalg.norm(points - points[0], axis=1).max()
+    assert region_figures.diameter(points) == pytest.approx(apart, rel=1e-12)
+
+
 def test_diameters_are_the_greatest_distances():
     rng = np.random.default_rng(0)
     for points in (rng.normal(size=(40, 2)), np.column_stack([np.arange(5.0), 2 * np.arange(5.0)]), np.ones((3, 2)),
