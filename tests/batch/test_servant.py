@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 
 import pytest
 
@@ -81,6 +82,17 @@ def test_what_crashes_hangs_or_takes_all_memory_takes_no_other_file_along(go, wo
     assert result.counts == {"done": 3, "failed": 1} and rows[name]["status"] == status
     assert len(served(work)) == 2 and not [names for names in served(work) if names.index(names[-1]) < len(names) - 1]
     assert next(names for names in served(work) if name in names)[-1] == name
+
+
+def test_limits_of_files_that_ended_in_time_end_with_them(go, work, shared):
+    """A limit that is still waited for would end the process while it serves another file."""
+    known = set(threading.enumerate())
+    work.put("a.obj", "bad.obj", "c.obj")
+    assert go(shared(1), timeout=600.0)[0].counts == {"done": 2, "failed": 1}
+    limits = [each for each in threading.enumerate() if isinstance(each, threading.Timer) and each not in known]
+    for each in limits:
+        each.join(5)
+    assert not any(each.is_alive() for each in limits)
 
 
 def test_a_process_serves_no_more_than_so_many_files(package, go, work, shared, monkeypatch):
