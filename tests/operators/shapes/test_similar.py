@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 
+import pytest
 import scenes
 from mathutils import Vector
 
@@ -36,6 +39,26 @@ def test_duplicates_of_any_triangles_and_place_are_selected_and_what_has_handles
         {"Own", "Long"},
         {"Own", "Round"},
     )
+
+
+@pytest.mark.parametrize("floor, least", [(0.0, 1e-6), (1e-9, 1e-6), (1e-6, 1e-6), (0.25, 0.25)])
+@pytest.mark.parametrize("bound", [1.5, 2.0])
+def test_duplicates_are_those_within_so_many_times_what_triangles_alone_make(package, monkeypatch, floor, least, bound):
+    """The bound counts as within; where triangles make no difference, one of a millionth is none."""
+    for name in ("At", "Beyond", "Far"):
+        body(name, 1, 1)
+    body("Own", 1, 1)
+    raw = {"At": bound * least, "Beyond": bound * least * (1 + 1e-9), "Far": 1.0}
+
+    def alike(*_):
+        yield from ()
+        return [(name, SimpleNamespace(raw=raw[name], floor=floor, distance=raw[name])) for name in raw], ["told"]
+
+    monkeypatch.setattr(package("pipelines.shapes.distance"), "alike", alike)
+    assert bpy.ops.object.omt_similar(bound=bound) == {"FINISHED"}
+    assert selected() == {"Own", "At"}
+    assert bpy.ops.object.omt_similar(bound=bound, select="NEAREST") == {"FINISHED"}
+    assert selected() == {"Own", "At"}
 
 
 def test_a_library_is_searched_and_what_is_none_is_refused(package, tmp_path):
