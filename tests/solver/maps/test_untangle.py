@@ -60,6 +60,15 @@ def test_a_boundary_on_the_circle():
     assert circle_boundary(V[:, :2], loop[::-1], 1.0) is None
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("at", [[0], [0, 3], slice(None)])
+def test_a_boundary_through_the_middle_is_on_no_circle_and_nothing_is_divided_by_nothing(at):
+    V, F, loop, _ = disk()
+    uv = V[:, :2].copy()
+    uv[loop[at]] = 0
+    assert circle_boundary(uv, loop, 1.0) is None
+
+
 def test_a_boundary_by_length():
     V, F = meshes.grid(4, 4)
     loop = boundary_loops(F)[0]
