@@ -222,3 +222,26 @@ def test_a_closed_line_begins_where_it_is_cut_first_and_nowhere_else():
     assert len(set(edged[4:])) == 1 and edged[4] > 0
     held = half_of([[4, 5], [5, 6]], [False, False], held=[1]).groups(np.array([False, False]), nowhere)
     assert held[5] == held[6] > 0 and held[4] == -1
+
+
+@pytest.mark.parametrize("opens, cheaper", [(True, True), (True, False), (False, True)])
+@pytest.mark.parametrize("by", ["turned", "shortened"])
+def test_a_cut_is_left_for_a_cheaper_one_that_opens_the_component(by, opens, cheaper, monkeypatch):
+    """By cuts that cost as much as they have edges."""
+    V, F = meshes.icosphere(2)
+    half = symmetric_halves(component_of(V, F))[0]
+    tips = np.unique(half.ends[half.line])[:3]
+    chosen = half.held.copy()
+    chosen[np.flatnonzero(half.across)[:3]] = True
+    other = half.held.copy()
+    other[np.flatnonzero(half.across)[: 2 if cheaper else 4]] = True
+    cls = symmetric_cuts.SymmetricHalf
+    monkeypatch.setattr(cls, "joined", lambda self, begin, ends: other.copy())
+    monkeypatch.setattr(cls, "cost", lambda self, edges: float(edges.sum()))
+    monkeypatch.setattr(cls, "opens", lambda self, edges: opens)
+    if by == "turned":
+        monkeypatch.setattr(cls, "shortened", lambda self, edges, tips, sweeps: edges)
+        found = half.turned(chosen, tips)
+    else:
+        found = half.shortened(chosen, tips)
+    assert np.array_equal(found, other if opens and cheaper else chosen)
