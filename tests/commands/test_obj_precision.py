@@ -33,3 +33,19 @@ def test_every_coordinate_and_uv_of_every_object_comes_back(package, tmp_path, m
     np.testing.assert_allclose(places[:, :3], expected, rtol=0 if not moved else 1e-6, atol=0 if not moved else 1e-6)
     own = np.unique(np.concatenate([scenes.uv_of(o) for o in objects]), axis=0)
     np.testing.assert_array_equal(np.unique(uvs, axis=0), own)
+
+
+@pytest.mark.parametrize("faces", [[], [(0, 1, 2)]], ids=["no faces", "a face"])
+@pytest.mark.parametrize("first", [False, True])
+def test_objects_without_uvs_stand_beside_others(package, tmp_path, faces, first):
+    """Whatever they have of faces, their places and the UVs of the others come back."""
+    bare = scenes.add([[1 / 3, 0, 0], [1, 1 / 7, 0], [0, 1, 1 / 9]], faces, "A bare" if first else "Z bare")
+    mapped = scenes.bump(3, 3, name="Mapped", offset=2.0)
+    uv = np.random.default_rng(5).random((len(mapped.data.loops), 2)).astype(np.float32)
+    scenes.set_uv(mapped, uv)
+    objects = [bare, mapped] if first else [mapped, bare]
+    package("files.saving").save(tmp_path / "out.obj", objects)
+    places = numbers(tmp_path / "out.obj", "v")[:, :3]
+    own = np.array([v.co for v in bare.data.vertices], np.float32)
+    assert all((places == row).all(axis=1).any() for row in own)
+    np.testing.assert_array_equal(np.unique(numbers(tmp_path / "out.obj", "vt"), axis=0), np.unique(uv, axis=0))
