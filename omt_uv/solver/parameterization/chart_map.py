@@ -353,7 +353,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
             if even is not None:
                 return even
     if not draft:
-        roomy = roomy_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log)
+        roomy = roomy_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log, large=False)
         if roomy is not None:
             return roomy
     if len(disk.vertices) > (DRAFT_ABOVE if draft else COARSE_ABOVE):

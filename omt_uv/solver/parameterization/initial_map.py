@@ -342,7 +342,7 @@ def _energy(faces: Elements, uv: np.ndarray, area_weight: float) -> float:
     return energy(faces, w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum()), area_weight)
 
 
-def evened_initial_map(disk: DiskMesh, log: RunLog, large: bool = False) -> InitialChartMap | None:
+def evened_initial_map(disk: DiskMesh, log: RunLog, large: bool) -> InitialChartMap | None:
     """A disk of a middle size at most, or a large one, embedded in its domain by evened weights; None where that
     squeezes it. It leaves as little to do as conformal map and transport, which take as long as the refinement."""
     if large != (len(disk.vertices) > DIRECT_WITH_ROOM) or disk.is_far:

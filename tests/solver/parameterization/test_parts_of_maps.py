@@ -617,7 +617,7 @@ def test_an_evened_start_is_for_meshes_of_a_middle_size_near_their_areas(most, f
     disk.__dict__["is_far"] = far
     monkeypatch.setattr(initial_map, "DIRECT_WITH_ROOM", most)
     monkeypatch.setattr(initial_map, "evened_sites", lambda *_: "sites")
-    start = initial_map.evened_initial_map(disk, RunLog())
+    start = initial_map.evened_initial_map(disk, RunLog(), large=False)
     assert (None if start is None else start.uv) == found
 
 
@@ -628,7 +628,7 @@ def test_an_evened_start_may_be_squeezed_where_vertices_will_leave_the_circle(bo
     asked = []
     monkeypatch.setattr(initial_map, "is_crowded", lambda *_: crowded)
     monkeypatch.setattr(initial_map, "evened_sites", lambda *words: asked.append(words[4]))
-    assert initial_map.evened_initial_map(disk_mesh(boundary, corners=np.arange(4)), RunLog()) is None
+    assert initial_map.evened_initial_map(disk_mesh(boundary, corners=np.arange(4)), RunLog(), large=False) is None
     assert asked == [most]
 
 

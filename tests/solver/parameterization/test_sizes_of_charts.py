@@ -84,7 +84,7 @@ def test_charts_up_to_a_middle_size_are_evened(count, tried, monkeypatch):
     monkeypatch.setattr(initial_map, "elements", lambda *_: None)
     monkeypatch.setattr(initial_map, "is_crowded", lambda *_: False)
     monkeypatch.setattr(initial_map, "evened_sites", lambda *_: "evened")
-    found = initial_map.evened_initial_map(sized(count, boundary="disk"), RunLog())
+    found = initial_map.evened_initial_map(sized(count, boundary="disk"), RunLog(), large=False)
     assert (found is not None) == tried
 
 

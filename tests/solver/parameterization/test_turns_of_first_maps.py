@@ -37,7 +37,7 @@ def first(monkeypatch):
         tried, log = [], RunLog()
 
         def given(name, value):
-            def taking(*words):
+            def taking(*_, **__):
                 tried.append(name)
                 return value
 
