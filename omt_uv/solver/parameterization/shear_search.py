@@ -52,9 +52,9 @@ SLACK = 0.85
 MARGIN = 0.95
 # What has no map is asked for this share of what cuts have left.
 UNKNOWN = 0.5
-NO_EDGES = np.zeros((0, 2), np.int64)
 # Of a surface in one piece the largest chart has this share of the area, but for crumbs.
 ONE_PIECE = 0.97
+NO_EDGES = np.zeros((0, 2), np.int64)  # what is slit where nothing is
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.charts import Chart
 from ..mesh.geometry import cross3, edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
+from .growth import EVEN
 from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
@@ -331,7 +332,9 @@ def slits(
     reach = dijkstra(ways, indices=start, min_only=True)[chart.triangles[steep]]
     length = np.full(len(size), 1e-300)
     np.maximum.at(length, piece[graph.polygon[steep]], np.where(np.isfinite(reach), reach, 0.0).max(axis=1))
-    order = np.lexsort((-size, -np.where(size >= LITTLE * least, size / length, 0.0)))
+    worth = np.where(size >= LITTLE * least, size / length, 0.0)
+    # Where two are worth the same, rounding does not choose between them.
+    order = np.lexsort([-np.round(np.log(np.maximum(x, 1e-300)) / EVEN) for x in (size, worth)])
     enough = int(np.searchsorted(np.cumsum(size[order]), least)) + 1
     # One more every time, at least: the same slits would be in vain again.
     chosen = order[: min(max(enough, rounds), rounds * MOST_SLITS)]
