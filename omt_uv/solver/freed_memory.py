@@ -17,7 +17,7 @@ from functools import cache
 MANY = 100_000
 # Vertices of a mesh of which the arrays of single steps take so much: each of them finds other holes that are free, and
 # all that were touched in turn take as much memory as a matrix.
-VERY_MANY = 500_000
+VERY_MANY = 800_000
 # Bytes that are kept where they are free: what a step of 10,000 vertices asks for, most of which it never touches; and
 # up to which an array is taken from these, as many as the library allows.
 KEPT = 1 << 28
