@@ -14,7 +14,7 @@ from ..analysis.feature_edges import fold_angles
 from ..maps.contacts import lies_apart
 from ..maps.development import developed
 from ..maps.overlap import overlap_share
-from ..mesh.geometry import angle_defects, angles_from_lengths, as_points, face_areas, halfedge_lengths
+from ..mesh.geometry import as_points, face_areas
 from .component import CutComponent
 from .cut_graph import cut_classes, greedy_arcs
 from .hard_surface import net_factors, rounded_corners
@@ -148,12 +148,7 @@ def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
 
 def defects(component: CutComponent) -> np.ndarray:
     """Curvature (n,) of the vertices, in radians, 0 on the boundary."""
-    length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
-    on_boundary = component.on_boundary()
-    signed = angle_defects(
-        component.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), component.vertex_count
-    )
-    return np.where(on_boundary, 0.0, signed)
+    return np.where(component.on_boundary(), 0.0, component.curvature)
 
 
 def _flat(curvature: np.ndarray) -> float:

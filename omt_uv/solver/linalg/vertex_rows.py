@@ -265,9 +265,10 @@ class VertexRows:
         What is added to the pattern may join vertices of a colour: their blocks are as much greater as makes sweeps
         converge all the same (Baker, Falgout, Kolev, Yang 2011).
         """
-        xx, xy, yy = np.stack(self._blocks_of(slice(None)))
+        own = np.stack(self._blocks_of(slice(None)))
         if self._more is None:
-            return np.stack([xx, xy, yy])
+            return own
+        xx, xy, yy = own
         more = self._more.tocoo()
         row, column = more.row // 2, more.col // 2
         axes = more.row % 2 + more.col % 2

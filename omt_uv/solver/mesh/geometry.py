@@ -283,6 +283,15 @@ def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarra
     return flat - around
 
 
+def of_corners(of: np.ufunc, rows: np.ndarray) -> np.ndarray:
+    """What `of.reduce` makes of the three entries (m,3,...) of each row: that takes six times as long.
+
+    >>> of_corners(np.maximum, np.array([[1, 3, 2], [6, 4, 5]]))
+    array([3, 6])
+    """
+    return of(of(rows[:, 0], rows[:, 1]), rows[:, 2])
+
+
 def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Areas (m,) of triangles (m,3) and the gradients (m,3) complex of their hat functions, in their own planes."""
     sides = _sides_of(positions, triangles)
@@ -308,19 +317,20 @@ class Sides:
 
     def gradient(self, here: slice | np.ndarray) -> np.ndarray:
         """The gradients (k,3) complex of some triangles."""
-        if self._sides is None:
-            self._sides = _sides_of(*self._mesh)
-        return gradients_of(self._sides[here])
+        return gradients_of(self._found()[here])
 
     def areas(self, here: slice | np.ndarray) -> np.ndarray:
         """The areas (k,) of some triangles."""
-        if self._sides is None:
-            self._sides = _sides_of(*self._mesh)
-        return _areas_of(self._sides[here])
+        return _areas_of(self._found()[here])
 
     def let_go(self) -> None:
         """Hold nothing until it is asked for."""
         self._sides = None
+
+    def _found(self) -> np.ndarray:
+        if self._sides is None:
+            self._sides = _sides_of(*self._mesh)
+        return self._sides
 
 
 class Sizes:

@@ -12,6 +12,7 @@ from ..analysis.order_of_places import lowest_first, order_of_places
 from ..errors import MeshError, PinError
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart, triangle_rows
+from ..mesh.geometry import of_corners
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, distinct, pair_keys
 from ..refinement.pins import Pins, aligned_to_pins, check_pins
@@ -89,9 +90,8 @@ def _polygon_keys(triangles: np.ndarray, polygon: np.ndarray) -> tuple[np.ndarra
     """Of the polygon (m,) of each triangle: the highest vertex, the sum of all, the lowest; whichever way it is cut."""
     count, n = int(polygon.max(initial=-1)) + 1, int(triangles.max(initial=-1)) + 1
     if count == len(triangles):
-        ends = np.maximum(triangles[:, 1], triangles[:, 2]), np.minimum(triangles[:, 1], triangles[:, 2])
-        total = (triangles[:, 0] + triangles[:, 1] + triangles[:, 2]).astype(float)
-        return np.maximum(triangles[:, 0], ends[0]), total, np.minimum(triangles[:, 0], ends[1])
+        total = of_corners(np.add, triangles).astype(float)
+        return of_corners(np.maximum, triangles), total, of_corners(np.minimum, triangles)
     pairs = np.unique(np.repeat(polygon, 3) * np.int64(n) + triangles.ravel())
     owner, vertex = np.divmod(pairs, n)
     first = np.searchsorted(owner, np.arange(count))

@@ -278,9 +278,10 @@ def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd)
     if not chosen:
         return last
     changes = {"share": np.ones(search.count), "straighter": True, "stays_whole": True}
-    differs = edge_set(last.cuts.edges)
-    given, slits = (chosen, last.kept(chosen), search.first_spread(), changes), last.slits_within(chosen)
-    asked = Asked(*given, lambda edges: edge_set(edges) != differs, slits)
+    before, slits = edge_set(last.cuts.edges), last.slits_within(chosen)
+    asked = Asked(
+        chosen, last.kept(chosen), search.first_spread(), changes, lambda edges: edge_set(edges) != before, slits
+    )
     new = yield from _cut_anew(search, last, asked, map_charts, early)
     if new is None or new is last:
         return last

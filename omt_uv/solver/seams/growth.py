@@ -80,9 +80,13 @@ def _arcs(task: Task, cut: Cut, model: ScaleModel) -> list[_Arc]:
             if worth > 0 and (best is None or worth > best.worth * (1 + EVEN)):
                 best = _Arc(path[begin:], worth)
         found += [] if best is None else [best]
-    # Where two are worth the same, rounding does not choose between them.
-    worth = np.round(np.log([arc.worth for arc in found]) / EVEN)
-    return [found[k] for k in np.argsort(-worth, kind="stable")]
+    return [found[k] for k in np.argsort(-ranks(np.array([arc.worth for arc in found])), kind="stable")]
+
+
+def ranks(worth: np.ndarray) -> np.ndarray:
+    """Numbers (k,) in the order of what is worth so much (k,) >= 0: where two are worth the same, rounding does not
+    choose between them."""
+    return np.round(np.log(np.maximum(worth, 1e-300)) / EVEN)
 
 
 def _from_cut_on(path: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,6 +114,4 @@ def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
         peak |= (height >= around) & (height > 0)
     peaks = np.flatnonzero(peak & np.isfinite(cost) & (cost > 0))
     worth = gain[peaks] * task.tip_factor[peaks] / cost[peaks]
-    # Where two are worth the same, rounding does not choose between them.
-    worth = np.round(np.log(np.maximum(worth, 1e-300)) / EVEN)
-    return peaks[np.argsort(-worth, kind="stable")[:MOST_TIPS]]
+    return peaks[np.argsort(-ranks(worth), kind="stable")[:MOST_TIPS]]

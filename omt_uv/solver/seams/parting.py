@@ -22,7 +22,7 @@ from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.charts import Chart
 from ..mesh.geometry import cross3, edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
-from .growth import EVEN
+from .growth import ranks
 from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
@@ -104,6 +104,10 @@ class PolygonGraph:
         """What cutting each edge (e,) costs; cost (n,) : at the vertices of the chart, per length."""
         return cost[self.ends].mean(axis=1) * edge_lengths(chart.vertices, self.ends)
 
+    def smaller(self, side: np.ndarray) -> float:
+        """The area of a side (p,) bool or of all else, whichever is less."""
+        return min(float(self.area[side].sum()), float(self.area[~side].sum()))
+
     def steps(self, chart: Chart) -> csr_matrix:
         """The lengths of the edges as a matrix (p,p), none of them 0."""
         return self.matrix(edge_lengths(chart.vertices, self.ends) + 1e-300)
@@ -174,13 +178,11 @@ def _image_of(
     there = np.bincount(graph.polygon, inside[nearest[corner]].mean(axis=1), len(side)) > 0.5 * count
     other = float(graph.area[there != side].sum())
     whole = float(graph.area.sum())
-    smaller = min(float(graph.area[side].sum()), float(graph.area[~side].sum()))
-    if min(other, whole - other) < min(LEAST_PART * whole, smaller) or not graph.around(there).any():
+    if min(other, whole - other) < min(LEAST_PART * whole, graph.smaller(side)) or not graph.around(there).any():
         return side
     beside = np.unique(graph.joined[graph.around(there)])
     far = dijkstra(graph.steps(chart), indices=beside, min_only=True)
-    smaller = min(float(graph.area[there].sum()), float(graph.area[~there].sum()))
-    inner = far > NEAR_IMAGE * np.sqrt(smaller)
+    inner = far > NEAR_IMAGE * np.sqrt(graph.smaller(there))
     if not (inner & there).any() or not (inner & ~there).any():
         return side
     return minimum_cut(graph, capacity, np.flatnonzero(inner & there), np.flatnonzero(inner & ~there))
@@ -333,8 +335,7 @@ def slits(
     length = np.full(len(size), 1e-300)
     np.maximum.at(length, piece[graph.polygon[steep]], np.where(np.isfinite(reach), reach, 0.0).max(axis=1))
     worth = np.where(size >= LITTLE * least, size / length, 0.0)
-    # Where two are worth the same, rounding does not choose between them.
-    order = np.lexsort([-np.round(np.log(np.maximum(x, 1e-300)) / EVEN) for x in (size, worth)])
+    order = np.lexsort((-ranks(size), -ranks(worth)))
     enough = int(np.searchsorted(np.cumsum(size[order]), least)) + 1
     # One more every time, at least: the same slits would be in vain again.
     chosen = order[: min(max(enough, rounds), rounds * MOST_SLITS)]
