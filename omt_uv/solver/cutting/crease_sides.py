@@ -39,6 +39,12 @@ SHARP = 0.8
 ALL = 0.95
 MOST_SIDES = 2_000
 FEW_SIDES = 64
+# A body of more sides than this has no hard surface if those with at most so much curvature in the mean, in radians, at
+# the vertices within have less than that share of its area: low ones of animals and people are folded into many sides,
+# too, but these swell.
+SIMPLE = 50
+SWELLS = 0.05
+MOSTLY_FLAT = 0.85
 # A side is a ribbon with less of the area of a disk that has as long an outline.
 RIBBON = 0.2
 # A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
@@ -166,13 +172,17 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     area = np.bincount(side, face_areas(component.positions, component.triangles))
     curvature = np.abs(defects(component))
-    unrolls = _inner_curvature(component, side, border, curvature, len(area)) <= ROUND
+    bent = _inner_curvature(component, side, border, curvature, len(area))
+    unrolls = bent <= ROUND
     large = area >= LARGE * area.sum()
     # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
     sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
     mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
     # Of noise every triangle is a side.
     few = len(area) <= MOST_SIDES
+    within = _inner_curvature(component, side, border, np.ones(len(curvature)), len(area))
+    if len(area) > SIMPLE and area[bent <= SWELLS * within].sum() < MOSTLY_FLAT * area.sum():
+        return None
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
     unrolled = area[unrolls].sum() >= ALL * area.sum()
     if not sure and not (few and unrolled):

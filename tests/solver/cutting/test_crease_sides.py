@@ -285,6 +285,20 @@ def test_a_body_of_few_sides_that_unroll_comes_apart_though_some_meet_bluntly():
     assert side.max() + 1 == 4
 
 
+def pyramid(steps, slope):
+    """Eight-sided, its base a cone of such a slope."""
+    ledge = 1 - 0.8 * np.arange(steps) / steps
+    profile = np.column_stack([np.repeat(ledge, 2), 0.05 * (np.arange(1, 2 * steps + 1) // 2)])
+    V, F = lathed(profile, 8)
+    V[-2, 2] -= slope  # the middle of the lower end
+    return V, F
+
+
+@pytest.mark.parametrize(("steps", "slope", "hard"), [(8, 0.05, True), (8, 0.25, False), (4, 0.25, True)])
+def test_a_body_of_many_sides_that_swell_stays_whole(steps, slope, hard):
+    assert (hard_sides(component_of(*pyramid(steps, slope))) is not None) == hard
+
+
 @pytest.mark.parametrize(("height", "ribbons"), [(8.0, False), (15.0, True)])
 def test_a_tube_of_ribbons_stays_whole(height, ribbons):
     """Sides that meet at 80 and at 40 degrees in turn, each 1 wide: about half of their borders are hard."""
