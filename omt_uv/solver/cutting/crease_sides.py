@@ -41,10 +41,14 @@ MOST_SIDES = 2_000
 FEW_SIDES = 64
 # A body of more sides than this has no hard surface if those with at most so much curvature in the mean, in radians, at
 # the vertices within have less than that share of its area: low ones of animals and people are folded into many sides,
-# too, but these swell.
+# too, but these swell. Where one of very many has hardly any borders within so much, in radians, of a right angle, as
+# buildings and machines have, nearly all of it has to be sides with no more in sum.
 SIMPLE = 50
 SWELLS = 0.05
 MOSTLY_FLAT = 0.85
+INTRICATE = 220
+SQUARED = 0.2
+NEARLY_RIGHT = np.radians(6)
 # A side is a ribbon with less of the area of a disk that has as long an outline.
 RIBBON = 0.2
 # A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
@@ -180,8 +184,7 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
     # Of noise every triangle is a side.
     few = len(area) <= MOST_SIDES
-    within = _inner_curvature(component, side, border, np.ones(len(curvature)), len(area))
-    if len(area) > SIMPLE and area[bent <= SWELLS * within].sum() < MOSTLY_FLAT * area.sum():
+    if len(area) > SIMPLE and _swells(component, side, border, fold, area, bent):
         return None
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
     unrolled = area[unrolls].sum() >= ALL * area.sum()
@@ -199,6 +202,18 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     flat = _inner_curvature(component, whole, border, curvature, len(inside)) <= ROUND
     return whole, np.where(inside, np.bincount(whole, (unrolls & large)[side]) > 0, flat)
+
+
+def _swells(component: CutComponent, side, border, fold, area, bent) -> bool:
+    """Whether much of a component is sides (m,), with areas (s,) and curvature within (s,), that swell.
+
+    border (e,) bool, fold (e,) : of its edges
+    """
+    right = border & (np.abs(fold - np.pi / 2) <= NEARLY_RIGHT)
+    if len(area) > INTRICATE and component.length[right].sum() < SQUARED * component.length[border].sum():
+        return bool(area[bent <= SWELLS].sum() < ALL * area.sum())
+    within = _inner_curvature(component, side, border, np.ones(component.vertex_count), len(area))
+    return bool(area[bent <= SWELLS * within].sum() < MOSTLY_FLAT * area.sum())
 
 
 def _ribbons(component: CutComponent, side: np.ndarray, border: np.ndarray) -> bool:

@@ -299,6 +299,32 @@ def test_a_body_of_many_sides_that_swell_stays_whole(steps, slope, hard):
     assert (hard_sides(component_of(*pyramid(steps, slope))) is not None) == hard
 
 
+def cogged(teeth, height, slope):
+    """A wheel whose teeth are roofs of 80 degrees, its ends cones of such a slope within a level ring."""
+    way = np.pi * np.arange(2 * teeth) / teeth
+    out = 1 + np.pi / teeth * np.tan(np.radians(40)) * (np.arange(2 * teeth) % 2)
+    wheel = np.stack([np.cos(way), np.sin(way)], axis=1)
+    V, F = prism(out[:, None] * wheel, height)
+    n, k = len(V), 2 * teeth
+    rings = [np.column_stack([0.9 * wheel, np.full(k, z)]) for z in (0.0, height)]
+    V[-2:, 2] += [-0.9 * slope, 0.9 * slope]
+    fan = (F >= n - 2).any(axis=1)
+    # The vertices of its outline come first, the middle of the end last.
+    a, b, middle = np.array([np.roll(f, 2 - np.argmax(f)) for f in F[fan]]).T
+    ra, rb = a + n, b + n
+    quads = [np.column_stack(x) for x in ((a, b, rb), (a, rb, ra), (ra, rb, middle))]
+    return np.concatenate([V, *rings]), np.concatenate([F[~fan], *quads])
+
+
+@pytest.mark.parametrize(
+    ("teeth", "height", "slope", "hard"),
+    [(150, 1.0, 0.25, False), (150, 1.0, 0.05, True), (150, 0.05, 0.25, True), (60, 1.0, 0.25, True)],
+)
+def test_a_body_of_very_many_sides_without_right_angles_is_flat_or_stays_whole(teeth, height, slope, hard):
+    """The lower the wheel is, the more of its edges are around its ends, with right angles."""
+    assert (hard_sides(component_of(*cogged(teeth, height, slope))) is not None) == hard
+
+
 @pytest.mark.parametrize(("height", "ribbons"), [(8.0, False), (15.0, True)])
 def test_a_tube_of_ribbons_stays_whole(height, ribbons):
     """Sides that meet at 80 and at 40 degrees in turn, each 1 wide: about half of their borders are hard."""
