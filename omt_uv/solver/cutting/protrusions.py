@@ -115,9 +115,9 @@ def _solved(laplacian: csr_matrix, curvature: np.ndarray, fixed: np.ndarray) -> 
 
 
 def spread(component: CutComponent, scale: np.ndarray) -> float:
-    """Mean square over the surface of a log scale (n,)."""
+    """Mean square over the surface of a log scale (n,); 0 where it has no area."""
     area = vertex_areas(component.positions, component.triangles)
-    return float(area @ scale**2 / area.sum())
+    return float(area @ scale**2 / max(area.sum(), 1e-300))
 
 
 def first_tips(component: CutComponent) -> np.ndarray:

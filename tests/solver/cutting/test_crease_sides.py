@@ -308,7 +308,7 @@ def cogged(teeth, height, slope):
     n, k = len(V), 2 * teeth
     rings = [np.column_stack([0.9 * wheel, np.full(k, z)]) for z in (0.0, height)]
     V[-2:, 2] += [-0.9 * slope, 0.9 * slope]
-    fan = (F >= n - 2).any(axis=1)
+    fan = F.max(axis=1) >= n - 2
     # The vertices of its outline come first, the middle of the end last.
     a, b, middle = np.array([np.roll(f, 2 - np.argmax(f)) for f in F[fan]]).T
     ra, rb = a + n, b + n

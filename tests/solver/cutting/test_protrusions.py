@@ -1,5 +1,7 @@
 """Where flat maps would be distorted most."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -64,6 +66,7 @@ def test_a_cut_holds_both_of_its_sides_at_zero_and_all_else_as_if_it_were_open()
 def test_the_spread_of_a_constant_is_its_square():
     component = component_of(*meshes.bumpy())
     assert spread(component, np.full(component.vertex_count, 3.0)) == pytest.approx(9)
+    assert spread(replace(component, positions=0 * component.positions), np.full(component.vertex_count, 3.0)) == 0
 
 
 def test_round_surfaces_fill_a_disk_and_long_ones_are_distorted():
