@@ -36,14 +36,13 @@ MOST_LEFT = 0.3
 # A net is worth its seams up to this many times the side of a square with the area of the surface.
 LONGEST = 5.0
 # Nets that lie on themselves are drawn anew so many times, on components of so many triangles at most, with costs whose
-# logarithms vary by so much; by so many samples, and a share of the area that is less is rounding.
+# logarithms vary by so much. What is covered twice by more than a share of the area counts: few samples see what is
+# much, as it is on most nets of large bodies, and more of them what is less; less than the last share is rounding.
 NETS = 24
-SAMPLES = 10_000
-FEW = 500
 MOST_TRIANGLES = 20_000
 VARIED = 0.5
-COVERED = 1e-3
 MUCH = 2e-2
+COVERED = ((500, MUCH), (2_500, 4e-3), (10_000, 1e-3))
 # Edges within flat or developable sides count so many times, which leaves these in one component.
 ACROSS = 1.5
 # A net to more corners whose slits are longer, next to the side of a square with the area of the surface, is a comb.
@@ -141,9 +140,8 @@ def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
     # What is not quite flat is laid somewhere else by its map.
     if gap.max() > FLAT * np.abs(flat).max() or lies_apart(flat, corners):
         return False
-    uv = as_points(flat)
-    # Few samples see what covers much: most nets of large bodies do.
-    return overlap_share(uv[corners], samples=FEW) > MUCH or overlap_share(uv[corners], samples=SAMPLES) > COVERED
+    uv = as_points(flat)[corners]
+    return any(overlap_share(uv, samples=samples) > share for samples, share in COVERED)
 
 
 def defects(component: CutComponent) -> np.ndarray:
