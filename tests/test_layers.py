@@ -93,10 +93,10 @@ ARROWS: dict[str, str] = {
     "session": "errors settings solver solver.mesh solver.maps solver.editing solver.parameterization pipelines "
     "blender",
     "batch": "errors supervision solver",
-    "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
+    "commands": "errors supervision remedies settings solver solver.mesh solver.comparison solver.cutting solver.globe "
     "solver.parameterization pipelines pipelines.measuring pipelines.regions pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
-    "files display solver.flows solver.volumes solver.strain solver.editing",
+    "files files.in_place display solver.flows solver.volumes solver.strain solver.editing",
     "commands.pictures": "settings solver pipelines.measuring display.textures files commands",
     "commands.shapes": "settings supervision batch display solver solver.signatures solver.mesh solver.registration "
     "solver.strain pipelines.shapes blender "

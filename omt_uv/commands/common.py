@@ -43,7 +43,7 @@ def require_blender() -> None:
     from ..files.silence import silence
 
     try:
-        with silence(), _without_collections():
+        with silence(), without_collections():
             from ..blender import mesh  # noqa: F401
             from ..files import meshes  # noqa: F401
     except ModuleNotFoundError as error:
@@ -51,8 +51,8 @@ def require_blender() -> None:
 
 
 @contextmanager
-def _without_collections() -> Iterator[None]:
-    """Look for no garbage while Blender is imported for the first time, nor in what that has left, ever.
+def without_collections() -> Iterator[None]:
+    """Look for no garbage while Blender or numpy is imported for the first time, nor in what that has left, ever.
 
     It is a hundred thousand objects that stay: to go through them again and again takes a tenth of a small command.
     """

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from .common import CommandError, check_paths, require_blender, warn, write_preview
-from .selection import read_file
+from .common import CommandError, check_paths, require_blender, warn, without_collections, write_preview
+from .selection import read_file, read_plain_file
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..pipelines.gate import Gate
 
 
@@ -21,8 +23,17 @@ class Written:
     gate: Gate
 
 
-def read_layers(options: argparse.Namespace) -> tuple[list, list]:
-    """Objects and their Readings; refuses an output or a layer that cannot be written before the long work."""
+def read_layers(options: argparse.Namespace, plain: bool = False) -> tuple[list, list]:
+    """Objects and their Readings; refuses an output or a layer that cannot be written before the long work.
+
+    plain : the object may be a `PlainObj`, of which nothing but UVs is asked
+    """
+    if plain and options.output.suffix.lower() == options.input.suffix.lower() == ".obj":
+        with without_collections():
+            check_paths(options)
+            found = read_plain_file(options)
+        if found is not None:
+            return [found[0]], [found[1]]
     require_blender()
     from ..blender.mesh import check_target
 
@@ -43,23 +54,48 @@ def write_layers(options: argparse.Namespace, pairs, result, apart: bool = False
     ------
     CommandError : `--strict` does not let UVs with folds or overlap pass
     """
-    from ..blender.mesh import read_uv, target_layer, write_uv
-    from ..files.saving import save_uvs
     from ..pipelines.gate import gate
 
-    pairs, final = list(pairs), []
+    pairs, objects, final = list(pairs), [], []
     for (obj, reading), corners, uv in zip(pairs, result.corners, result.uv, strict=True):
-        layer = target_layer(obj, options.uv_layer)
-        write_uv(obj, layer, corners, uv)
-        final.append(replace(reading, uv=read_uv(obj.data, layer)))
+        mapped, values = _mapped(obj, options.uv_layer, corners, uv)
+        objects.append(mapped)
+        final.append(replace(reading, uv=values))
     found = gate(final, apart)
     told = found.warnings()
     if told and options.strict:
         raise CommandError(f"{options.input}: {'; '.join(told)}. Nothing was written, as --strict asks.")
     if told and existed:
         told = found.warnings(gate([reading for _, reading in pairs], apart))
-    objects = [obj for obj, _ in pairs]
     warnings = [*result.warnings, *((-1, text) for text in told)]
-    lines = warn(objects, warnings, save_uvs(options.output, objects, options.input))
+    lines = warn(objects, warnings, _saved(options, objects))
     write_preview(options, zip(objects, final, strict=True))
     return Written(lines, found)
+
+
+def is_plain(objects: list) -> bool:
+    """Whether objects are none of Blender's, which has not been started then."""
+    from ..files.in_place.plain_obj import PlainObj
+
+    return any(isinstance(obj, PlainObj) for obj in objects)
+
+
+def _mapped(obj, layer: str, corners, uv) -> tuple[Any, np.ndarray]:
+    """An object with UVs (k,2) at corners (k,) of a layer, and the UVs (c,2) float32 that it has then."""
+    if is_plain([obj]):
+        mapped = obj.with_uv(corners, uv)
+        return mapped, mapped.mesh.uv
+    from ..blender.mesh import read_uv, target_layer, write_uv
+
+    layer = target_layer(obj, layer)
+    write_uv(obj, layer, corners, uv)
+    return obj, read_uv(obj.data, layer)
+
+
+def _saved(options: argparse.Namespace, objects: list) -> list[str]:
+    """Write the file with the UVs that its objects have now; returns warnings."""
+    from ..files.saving import put_uvs, save_uvs
+
+    if is_plain(objects):
+        return [text for told in put_uvs(options.output, [obj.mesh for obj in objects], options.input) for text in told]
+    return save_uvs(options.output, objects, options.input)

@@ -180,9 +180,11 @@ def add_subdivision(command) -> None:
 
 def chosen_subdivision(options: argparse.Namespace, readings: list) -> list:
     """The readings with the levels that were asked for."""
+    if options.subdivision == "auto":
+        return readings
     from ..blender.subdivision import with_levels
 
-    return readings if options.subdivision == "auto" else [with_levels(r, options.subdivision) for r in readings]
+    return [with_levels(r, options.subdivision) for r in readings]
 
 
 def margin(text: str) -> float:

@@ -10,7 +10,44 @@ from typing import TYPE_CHECKING
 from .common import Y_IS_UP, CommandError, refusals, warn_of
 
 if TYPE_CHECKING:
+    from ..files.in_place.plain_obj import PlainObj
     from ..files.loaded import Loaded
+    from ..pipelines.reading import Reading
+
+# Options that ask for what Blender alone has of a file, or shows of it.
+OF_SCENES = ("object", "scene", "uv_layer", "keep_free", "centre", "start_group", "corners", "mark_seams", "preview")
+
+
+def read_plain_file(options: argparse.Namespace) -> tuple[PlainObj, Reading] | None:
+    """The mesh of an OBJ file and its Reading where its UVs can be had without Blender, which takes longer to start.
+
+    None where the file, or what is asked for, leaves something to Blender.
+    """
+    if options.output.suffix.lower() != ".obj" or options.subdivision != "auto":
+        return None
+    if any(getattr(options, name) for name in OF_SCENES):
+        return None
+    import numpy as np
+
+    from ..files.in_place.plain_obj import read_plain
+    from ..pipelines.reading import Y_UP, Reading
+    from ..solver.mesh.surface import Surface
+
+    found = read_plain(options.input)
+    if found is None:
+        return None
+    mesh, none = found.mesh, np.zeros((0, 2), np.int64)
+    surface = Surface(
+        positions=mesh.positions.astype(float) + 0.0,
+        corner_vertex=mesh.corner_vertex,
+        face_start=mesh.face_start,
+        triangles=found.triangles,
+        triangle_face=found.triangle_face,
+        seams=none,
+        sharp=none,
+    )
+    pinned = None if found.uv is None else np.zeros(len(mesh.corner_vertex), bool)
+    return found, Reading(surface, np.ones(len(mesh.face_start) - 1, bool), found.uv, pinned, axes=Y_UP)
 
 
 def read_file(options: argparse.Namespace, layer: str = "") -> list:

@@ -18,7 +18,7 @@ from ..settings import (
     Settings,
 )
 from .common import drain_shown, refusals, write_report
-from .layers import read_layers, write_layers
+from .layers import is_plain, read_layers, write_layers
 from .options import (
     add_area_options,
     add_cut_options,
@@ -102,26 +102,24 @@ def chosen(options: argparse.Namespace) -> Settings:
 
 
 def run(options: argparse.Namespace) -> None:
-    objects, readings = read_layers(options)
-    from ..blender.seams import mark_seams
-    from ..blender.subdivision import subdivision_warnings
-    from ..blender.vertex_groups import avoided, map_markers
+    objects, readings = read_layers(options, plain=True)
     from ..pipelines.layout import UnwrapJob
     from ..pipelines.unwrap import lay_out
 
     with refusals(objects):
-        free = avoided(objects, options.keep_free)
-        marked = map_markers(
-            objects, {"centre": options.centre, "start": options.start_group, "corners": options.corners}
-        )
+        free, marked = _groups(options, objects)
         readings = chosen_subdivision(options, readings)
         jobs = [
             UnwrapJob.of(r, r.subdivision, avoid, marks) for r, avoid, marks in zip(readings, free, marked, strict=True)
         ]
         layout = drain_shown(lay_out(jobs, chosen(options)))
-        if options.subdivision != 0:
+        if options.subdivision != 0 and not is_plain(objects):
+            from ..blender.subdivision import subdivision_warnings
+
             layout.warnings.extend(subdivision_warnings(objects))
         if options.mark_seams:
+            from ..blender.seams import mark_seams
+
             for obj, surface_map in zip(objects, layout.maps, strict=True):
                 mark_seams(obj, surface_map.seams)
         written = write_layers(options, zip(objects, readings, strict=True), layout, apart=options.no_pack)
@@ -133,3 +131,13 @@ def run(options: argparse.Namespace) -> None:
         write_report(
             options, {"boundary": options.boundary, "map": options.map, "packing": packing}, objects, charts, written
         )
+
+
+def _groups(options: argparse.Namespace, objects: list) -> tuple[list, list]:
+    """Weights (n,) of what cuts avoid, and markers of maps, for each object; None where it has none."""
+    groups = {"centre": options.centre, "start": options.start_group, "corners": options.corners}
+    if not options.keep_free and not any(groups.values()):
+        return [None] * len(objects), [None] * len(objects)
+    from ..blender.vertex_groups import avoided, map_markers
+
+    return avoided(objects, options.keep_free), map_markers(objects, groups)

@@ -16,7 +16,7 @@ from .formats.headers import check_header
 from .formats.off import read_off
 from .ply_uvs import add_uvs
 from .silence import silence
-from .verified import FileError, check_length, check_readable
+from .verified import FileError, check_length, check_readable, check_suffix
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # Blender turns these two formats by default; their axes are taken as they are.
@@ -66,12 +66,6 @@ def _check_names(path: Path, objects: list[bpy.types.Object]) -> None:
             [item.name for item in collection]
         except UnicodeDecodeError as error:
             raise FileError(f"{path}: a name in the file is no text, {error.object!r}. The file is damaged.") from error
-
-
-def check_suffix(path: Path, known: tuple[str, ...]) -> None:
-    """Raise FileError unless the suffix of a path is a known one."""
-    if path.suffix.lower() not in known:
-        raise FileError(f"{path}: unknown format {path.suffix!r}. Use one of {' '.join(known)}.")
 
 
 def _why(text: str) -> str:

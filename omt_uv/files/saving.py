@@ -10,23 +10,23 @@ import importlib
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 from urllib.parse import unquote
-
-import bpy
 
 import numpy as np
 
-from ..blender.mesh import read_uv
 from .in_place.imported import Imported, InPlaceError
-from .meshes import check_suffix, last_line
 from .silence import silence
-from .verified import FileError, check_bytes, check_writable, staged
+from .verified import FileError, check_bytes, check_suffix, check_writable, staged
+
+if TYPE_CHECKING:
+    import bpy
 
 WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx")
 # What can be changed in place, and the module of `in_place` that does it.
 IN_PLACE = {".obj": "obj", ".ply": "ply", ".glb": "glb", ".gltf": "gltf"}
 COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
-Objects = Sequence[bpy.types.Object]
+Objects: TypeAlias = "Sequence[bpy.types.Object]"
 
 
 def check_target(path: Path) -> None:
@@ -63,31 +63,45 @@ def save_uvs(path: Path, objects: Objects, source: Path) -> list[str]:
         return _save_blend(path, objects, source)
     told = []
     if suffix == source.suffix.lower() and suffix in IN_PLACE:
+        from .losses import losses_in_place
+
         try:
-            data, meshes = source.read_bytes(), [_imported(obj) for obj in objects]
-            # Formats that a file is not of are not read.
-            put = importlib.import_module(f"{__package__}.in_place.{IN_PLACE[suffix]}").put
-            folders = (source.resolve().parent, path.resolve().parent) if suffix == ".gltf" else ()
-            new, warnings = put(data, meshes, *folders)
+            done, behind = put_uvs(path, [_imported(obj) for obj in objects], source)
+            return [*done, *losses_in_place(suffix, objects), *behind]
         except InPlaceError as error:
             told = [
                 f"{source.name}: its UVs could not be changed in place: {error}. It was written anew, "
                 "and what Blender does not hold is lost"
             ]
-        except OSError as error:
-            raise FileError(f"{source}: {error.strerror}") from error
-        else:
-            with staged(path) as made:
-                made.write_bytes(new)
-                check_bytes(made, new)
-            from .losses import losses_in_place
-
-            return [*warnings, *losses_in_place(suffix, objects), *_left_behind(new, suffix, source, path)]
     return [*told, *_save_anew(path, objects, everything=True, source=source)]
+
+
+def put_uvs(path: Path, meshes: Sequence[Imported], source: Path) -> tuple[list[str], list[str]]:
+    """Write the bytes of the file that was read with other UVs; returns warnings about its faces and its companions.
+
+    Raises
+    ------
+    FileError : the file cannot be written
+    InPlaceError : the meshes are not those of the file
+    """
+    suffix = path.suffix.lower()
+    # Formats that a file is not of are not read.
+    put = importlib.import_module(f"{__package__}.in_place.{IN_PLACE[suffix]}").put
+    folders = (source.resolve().parent, path.resolve().parent) if suffix == ".gltf" else ()
+    try:
+        new, warnings = put(source.read_bytes(), meshes, *folders)
+    except OSError as error:
+        raise FileError(f"{source}: {error.strerror}") from error
+    with staged(path) as made:
+        made.write_bytes(new)
+        check_bytes(made, new)
+    return warnings, _left_behind(new, suffix, source, path)
 
 
 def _imported(obj: bpy.types.Object) -> Imported:
     """A mesh as Blender holds it."""
+    from ..blender.mesh import read_uv
+
     mesh = obj.data
     positions, corner = np.zeros(3 * len(mesh.vertices), np.float32), np.zeros(len(mesh.loops), np.int32)
     start = np.zeros(len(mesh.polygons), np.int32)
@@ -125,6 +139,9 @@ def _left_behind(data: bytes, suffix: str, source: Path, path: Path) -> list[str
 
 def _save_blend(path: Path, objects: Objects, source: Path | None) -> list[str]:
     """Save the session as a .blend, compressed if its source was."""
+    import bpy
+
+    from .meshes import last_line
     from .read_back import check_blend
 
     with staged(path) as made:

@@ -38,6 +38,12 @@ class FileError(UserError):
     """A file that cannot be read or written."""
 
 
+def check_suffix(path: Path, known: tuple[str, ...]) -> None:
+    """Raise FileError unless the suffix of a path is a known one."""
+    if path.suffix.lower() not in known:
+        raise FileError(f"{path}: unknown format {path.suffix!r}. Use one of {' '.join(known)}.")
+
+
 def check_writable(path: Path) -> None:
     """Raise FileError unless a file can be written to this path, as far as that can be told beforehand."""
     path = path.resolve()

@@ -142,10 +142,10 @@ def test_garbage_is_not_looked_for_while_blender_comes_and_again_afterwards(pack
     stand_in = SimpleNamespace(isenabled=lambda: state[0], disable=lambda: state.__setitem__(0, False),
                                enable=lambda: state.__setitem__(0, True), freeze=lambda: frozen.append(1))  # fmt: skip
     monkeypatch.setattr(common, "gc", stand_in)
-    with common._without_collections():
+    with common.without_collections():
         assert state == [collects and there]
     assert state == [collects] and bool(frozen) == (collects and not there)
-    with pytest.raises(ZeroDivisionError), common._without_collections():
+    with pytest.raises(ZeroDivisionError), common.without_collections():
         raise ZeroDivisionError
     assert state == [collects] and gc.isenabled()
 
