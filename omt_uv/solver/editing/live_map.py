@@ -16,7 +16,7 @@ from ..refinement.continuation_rules import FIRST_PRESSURE, NO_ENERGY, QUALITIES
 from ..refinement.elimination_order import renumbered
 from ..refinement.hessian_blocks import assembly_of
 from ..refinement.pins import PinEnergy, Pins, placed_like
-from ..refinement.projected_newton import FreeMotion, NewtonProblem, newton_step
+from ..refinement.projected_newton import FreeMotion, NewtonProblem, newton_direction, newton_step
 from .refine_island import island_elements, island_start, meets_itself
 
 # Of the springs between pins and where they are dragged to, energy per squared length in units of the map: stiff, as
@@ -69,10 +69,11 @@ class LiveMap:
         # what a slider wants.
         parts = schwarz_solver(mesh.vertices, mesh.triangles)
         assembly = assembly_of(faces, len(given), parts or KeptFactor())
-        if parts is not None:
-            # Not while the slider is being moved.
-            parts.prepare(assembly.pattern().tocsr())
         self._task = MapProblem(faces, assembly, motion, guard, False)
+        if parts is not None:
+            # Factors for the first steps are made before the slider is moved.
+            weight = final_weight(0.0, QUALITIES["standard"])
+            newton_direction(NewtonProblem(faces, assembly, motion, weight), start, FIRST_PRESSURE)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0
         self._stiffness = SOFT_STIFFNESS if soft else STIFFNESS

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
@@ -34,9 +35,15 @@ PART_SIZE = 500
 OVERLAP = 1
 # Where factors are kept, parts are factored in half of the time of all at once from so many vertices on.
 LARGE_KEPT = 7000
-# Iterations at most by factors that were kept. What these come to is a step all the same, and the next has new ones:
-# both in one would take twice as long.
-MOST_KEPT = 12
+# There parts are smaller: they are factored in three quarters of the time.
+SIZE_KEPT = 250
+# Iterations at most by factors that were kept. What these come to is a step all the same.
+MOST_KEPT = 9
+# From so many on, some of the factors are made anew for the next matrix: RENEWED of so many groups of parts, and of the
+# coarse equations, in turn. All of them in one step would take as long as two other steps.
+FEW = 6
+GROUPS = 6
+RENEWED = 2
 # Neighbours of a vertex beyond which it is no part of any overlap.
 MOST_NEIGHBOURS = 100
 # Iterations at most; the equations are factored where these are not enough.
@@ -55,14 +62,14 @@ AT_ONCE = 100_000
 class AdditiveSchwarz:
     """Parts of a mesh (n,d), (m,3), and where they overlap.
 
-    Unknown 2 i and 2 i + 1 are those of vertex i. keep: factors, for the next matrices, as long as they will do; steps
-    take about as long one as the other then, and some are less nearly right.
+    Unknown 2 i and 2 i + 1 are those of vertex i. keep: factors, for the next matrices, and make them anew some at a
+    time; steps take about as long one as the other then, and some are less nearly right.
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = PART_SIZE, keep: bool = False):
         n = len(points)
         self._keep = keep
-        self._kept: Callable[[np.ndarray], np.ndarray] | None = None
+        self._kept: _Kept | None = None
         self._last: np.ndarray | None = None
         self._ordered = False
         self._joined: list[_Joined] = []
@@ -94,13 +101,28 @@ class AdditiveSchwarz:
         # Its transpose is itself, by rows.
         matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
         if self._kept is not None:
-            self._last, done = nearly(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH, self._last)
-            self._kept = self._kept if done else None
+            self._renew(self._kept, matrix, w, axes)
+            self._last, _ = nearly(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH, self._last)
             return self._last
         x = self._solved_anew(matrix, b, w, axes)
         self._last = x if self._keep else None
         self._give_back()
         return x
+
+    def _renew(self, kept: _Kept, matrix: sp.csr_matrix, w: np.ndarray, axes: Callable[[], np.ndarray]) -> None:
+        """Make some of the factors anew where the last matrix took more than a few iterations by those there are, and
+        in the end all where it took too many: conjugate gradients may stand still by factors of which some are good."""
+        every = len(kept.groups) + 1
+        kept.left = max(kept.left, every if kept.calls >= MOST_KEPT else RENEWED if kept.calls >= FEW else 0)
+        kept.calls, now = 0, min(RENEWED, kept.left)
+        kept.left -= now
+        for _ in range(now):
+            k, kept.turn = kept.turn, (kept.turn + 1) % every
+            if k < len(kept.groups):
+                kept.groups[k] = self._group(matrix, k, kept.moves)
+            else:
+                kept.spread = affine_motions(self._part, self._count, w, axes())
+                kept.coarse = self._coarse_factor(matrix, kept.spread)
 
     def _give_back(self) -> None:
         """Give back what is free, unless the next matrix is waited for."""
@@ -115,22 +137,14 @@ class AdditiveSchwarz:
         self._give_back()
         spread = affine_motions(self._part, self._count, w, axes())
         self._give_back()
-        factors = self._factors(matrix, np.diff(spread.indptr) > 0)
+        moves = np.diff(spread.indptr) > 0
+        groups = [self._group(matrix, k, moves) for k in range(len(self._together()))]
         self._give_back()
-        gather = spread.T
-        coarse = self._coarse(matrix, spread)
-        coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
+        kept = _Kept(groups, moves, spread, self._coarse_factor(matrix, spread))
         self._give_back()
-
-        def precondition(r):
-            x = spread @ coarse.solve(gather @ r)
-            for d, factor in factors:
-                # Parts overlap: an unknown may be there several times.
-                np.add.at(x, d, factor.solve(r[d]))
-            return x
-
-        self._kept = precondition if self._keep else None
-        x = by_gradients(matrix, b, precondition, MOST, KEPT_ENOUGH if self._keep else ENOUGH)
+        self._kept = kept if self._keep else None
+        x = by_gradients(matrix, b, kept, MOST, KEPT_ENOUGH if self._keep else ENOUGH)
+        kept.calls = 0
         return Factor(matrix, "natural").solve(b) if x is None else x
 
     def prepare(self, matrix: sp.csr_matrix) -> None:
@@ -146,22 +160,27 @@ class AdditiveSchwarz:
 
     def _together(self) -> list[list[np.ndarray]]:
         """The unknowns of parts that are factored by one call."""
-        return [self._unknowns[k : k + TOGETHER] for k in range(0, self._count, TOGETHER)]
+        some = min(TOGETHER, -(-self._count // GROUPS)) if self._keep else TOGETHER
+        return [self._unknowns[k : k + some] for k in range(0, self._count, some)]
 
-    def _factors(self, matrix: sp.csr_matrix, moves: np.ndarray) -> list[tuple[np.ndarray, Factor]]:
-        """The unknowns of some parts each, and the factors of their equations one after the other; without parts of
-        which no unknown moves (2n,) bool: vertices that follow their images are half of a mesh, or more."""
-        found, place = [], np.full(matrix.shape[0], -1, np.int32)
-        for k, parts in enumerate(self._together()):
-            if not any(moves[d].any() for d in parts):
-                continue
-            known = self._joined[k] if self._joined and self._joined[k].fits(matrix) else None
-            joined = _Joined.of(matrix, parts, place) if known is None else known
-            try:
-                found.append((joined.unknowns, Factor(joined.taken(matrix), "natural", single=True)))
-            except PrecisionError:
-                found += [(d, _part_factor(_Joined.of(matrix, [d], place).taken(matrix))) for d in parts]
-        return found
+    def _group(self, matrix: sp.csr_matrix, k: int, moves: np.ndarray) -> list[tuple[np.ndarray, Factor]]:
+        """The unknowns of the parts of a group, and the factors of their equations one after the other; nothing where
+        no unknown of theirs moves (2n,) bool: vertices that follow their images are half of a mesh, or more."""
+        parts = self._together()[k]
+        if not any(moves[d].any() for d in parts):
+            return []
+        known = self._joined[k] if self._joined and self._joined[k].fits(matrix) else None
+        place = np.full(matrix.shape[0], -1, np.int32)
+        joined = _Joined.of(matrix, parts, place) if known is None else known
+        try:
+            return [(joined.unknowns, Factor(joined.taken(matrix), "natural", single=True))]
+        except PrecisionError:
+            return [(d, _part_factor(_Joined.of(matrix, [d], place).taken(matrix))) for d in parts]
+
+    def _coarse_factor(self, matrix: sp.csr_matrix, spread: sp.csr_matrix) -> Factor:
+        """The factors of the equations of the motions spread (2n, 6 parts)."""
+        coarse = self._coarse(matrix, spread)
+        return Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
 
     def _coarse(self, matrix: sp.csr_matrix, spread: sp.csr_matrix) -> sp.csc_matrix:
         """The equations (6 parts, 6 parts) of the motions spread (2n, 6 parts): some parts after the others, since what
@@ -175,6 +194,27 @@ class AdditiveSchwarz:
             motions = sp.csr_matrix((entries, place, count), shape=(spread.shape[0], 6 * len(some)))
             columns.append(gather @ (matrix @ motions))
         return sp.hstack(columns, format="csc")
+
+
+class _Kept:
+    """A preconditioner: `groups` of unknowns and factors of parts, which unknowns `moves` (2n,) bool, the motions
+    `spread` of the parts and the factors `coarse` of theirs.
+
+    calls : since the last matrix; turn : the group that is made anew next; left : how many there are to be made
+    """
+
+    def __init__(self, groups: list, moves: np.ndarray, spread: sp.csr_matrix, coarse: Factor):
+        self.groups: list[list[tuple[np.ndarray, Factor]]] = groups
+        self.moves, self.spread, self.coarse = moves, spread, coarse
+        self.calls = self.turn = self.left = 0
+
+    def __call__(self, r: np.ndarray) -> np.ndarray:
+        self.calls += 1
+        x = self.spread @ self.coarse.solve(self.spread.T @ r)
+        for d, factor in chain.from_iterable(self.groups):
+            # Parts overlap: an unknown may be there several times.
+            np.add.at(x, d, factor.solve(r[d]))
+        return x
 
 
 def affine_motions(part: np.ndarray, count: int, w: np.ndarray, axes: np.ndarray) -> sp.csr_matrix:
@@ -215,7 +255,11 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray) -> AdditiveSchwarz
 
     The order of the vertices is that of their elimination.
     """
-    return None if hangs_by_few(points, triangles, LARGE_KEPT) else AdditiveSchwarz(points, triangles, keep=True)
+    return (
+        None
+        if hangs_by_few(points, triangles, LARGE_KEPT)
+        else AdditiveSchwarz(points, triangles, SIZE_KEPT, keep=True)
+    )
 
 
 def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int | None = None) -> bool:

@@ -215,8 +215,13 @@ def test_pins_that_are_pulled_end_the_rest(soft, monkeypatch):
 
 @pytest.mark.parametrize("parts", [False, True])
 def test_large_islands_are_solved_by_parts_that_are_ready(parts, monkeypatch):
-    asked, prepared = [], []
-    ready = SimpleNamespace(prepare=prepared.append, factor=None)
+    asked, solved = [], []
+
+    def solve(matrix, b, w, axes):
+        solved.append((matrix.shape, axes().shape))
+        return b
+
+    ready = SimpleNamespace(solve=solve, factor=None)
 
     def schwarz(vertices, triangles):
         asked.append((vertices.shape[1], vertices.dtype.kind, triangles.dtype.kind, len(triangles)))
@@ -228,11 +233,13 @@ def test_large_islands_are_solved_by_parts_that_are_ready(parts, monkeypatch):
 
     def assembly(faces, n, solver):
         made.append(solver)
-        return given(faces, n, None if parts else solver)
+        return given(faces, n, solver)
 
     monkeypatch.setattr(live_map, "assembly_of", assembly)
     live()
-    assert asked == [(3, "f", "i", 32)] and len(prepared) == parts
+    assert asked == [(3, "f", "i", 32)]
+    # Before anything is followed.
+    assert solved == ([((50, 50), (25, 2))] if parts else [])
     assert (made[0] is ready) == parts
 
 

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from work import counted_work
 
 from omt_uv.solver.errors import PrecisionError
-from omt_uv.solver.linalg.additive_schwarz import AdditiveSchwarz
+from omt_uv.solver.linalg.additive_schwarz import FEW, RENEWED, AdditiveSchwarz
 from omt_uv.solver.linalg.kept_factor import KEPT_ENOUGH, WINDOW, KeptFactor, by_gradients
 
 
@@ -81,19 +81,35 @@ def test_parts_keep_their_factors_where_they_are_told_to(systems):
         assert fall(like, b, x) >= 0.85 * fall(like, b, exact)
 
 
-def test_parts_whose_factors_will_not_do_take_a_step_and_new_ones_for_the_next(systems):
+def test_parts_whose_factors_will_not_do_take_steps_and_new_ones_some_at_a_time(systems):
     V, F, first, _, other, b = systems
     w, axes = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1))
     far = other + sp.diags(np.geomspace(1, 1e6, len(b)) * other.diagonal())
-    exact, falls = KeptFactor().solve(far, b, b, lambda: b), []
+    exact, falls, factored = KeptFactor().solve(far, b, b, lambda: b), [], []
     parts = AdditiveSchwarz(V, F, 200, True)
     parts.solve(first, b, w, lambda: axes)
-    for factored in (False, True, False):
+    for _ in range(6):
         with counted_work() as work:
             x = parts.solve(far, b, w, lambda: axes)
-        assert (work.factorisations > 0) == factored and b @ x > 0
+        factored.append(work.factorisations)
+        assert b @ x > 0
         falls.append(fall(far, b, x) / fall(far, b, exact))
-    assert 0 < falls[0] < min(falls[1:]) and min(falls[1:]) >= 1 - KEPT_ENOUGH
+    # None for the first, some for each of the next until all are new, and then no more.
+    every = len(parts._kept.groups) + 1
+    assert factored == [0, RENEWED, RENEWED, every - 2 * RENEWED, 0, 0] and every > 2 * RENEWED
+    assert 0 < falls[0] < falls[-1] and falls[-1] >= 1 - KEPT_ENOUGH
+
+
+def test_new_factors_are_as_good_as_those_of_a_first_matrix(systems):
+    V, F, first, like, _, b = systems
+    w, axes = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1))
+    old, new = (AdditiveSchwarz(V, F, 200, True) for _ in range(2))
+    old.solve(first, b, w, lambda: axes)
+    for _ in old._kept.groups + [None]:
+        old._kept.calls = FEW
+        old._renew(old._kept, like, 1j * w, lambda: axes)
+    new.solve(like, b, 1j * w, lambda: axes)
+    np.testing.assert_allclose(old._kept(b), new._kept(b), rtol=1e-4)
 
 
 def test_an_order_that_is_found_before_changes_no_solution(systems):
