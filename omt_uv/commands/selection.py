@@ -36,15 +36,15 @@ def read_plain_file(options: argparse.Namespace) -> tuple[PlainObj, Reading] | N
     found = read_plain(options.input)
     if found is None:
         return None
-    mesh, none = found.mesh, np.zeros((0, 2), np.int64)
+    mesh = found.mesh
     surface = Surface(
         positions=mesh.positions.astype(float) + 0.0,
         corner_vertex=mesh.corner_vertex,
         face_start=mesh.face_start,
         triangles=found.triangles,
         triangle_face=found.triangle_face,
-        seams=none,
-        sharp=none,
+        seams=np.zeros((0, 2), np.int64),
+        sharp=found.sharp,
     )
     pinned = None if found.uv is None else np.zeros(len(mesh.corner_vertex), bool)
     return found, Reading(surface, np.ones(len(mesh.face_start) - 1, bool), found.uv, pinned, axes=Y_UP)

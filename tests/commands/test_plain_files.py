@@ -10,7 +10,7 @@ import bpy
 
 import numpy as np
 import pytest
-from meshes import bumpy
+from meshes import bumpy, icosphere
 
 V, F = bumpy(4, 5, height=0.3)
 VERTICES = "".join("v {} {} {}\n".format(*v) for v in V)
@@ -20,6 +20,8 @@ MAPPED = "".join("f {0}/{0} {1}/{1} {2}/{2}\n".format(*(f + 1)) for f in F)
 NORMALS = "".join("vn 0 0 1\n" for _ in V)
 SMOOTH = "".join("f {0}//{0} {1}//{1} {2}//{2}\n".format(*(f + 1)) for f in F)
 BOTH = "".join("f {0}/{0}/{0} {1}/{1}/{1} {2}/{2}/{2}\n".format(*(f + 1)) for f in F)
+ONE_NORMAL = "".join("f {}//1 {}//1 {}//1\n".format(*(f + 1)) for f in F)
+TWO_NORMALS = ONE_NORMAL.replace("//1", "//2", 1)
 QUADS = "v 0 0 0\nv 1 0 0\nv 1 1 .1\nv 0 1 0\nv 2 0 0\nv 2 1 0\n".replace(" .1", " 0.1")
 
 # Texts that Blender makes nothing else of.
@@ -54,7 +56,10 @@ BLENDERS = {
     "half of the UVs": VERTICES + UVS + MAPPED[: MAPPED.index("\n", 99)] + "\n" + FACES,
     "no such UV": VERTICES + "vt 0 0\n" + MAPPED,
     "no such normal": VERTICES + "vn 0 0 1\n" + SMOOTH,
-    "edges between normals": VERTICES + NORMALS + SMOOTH.replace("//1 ", "//2 ", 1),
+    "normals that hardly differ": VERTICES + "vn 0 0 1\nvn 0 0.01 1\n" + TWO_NORMALS,
+    "normals along a boundary": VERTICES + "vn 0 0 1\nvn 0 1 0\n" + TWO_NORMALS,
+    "no normal": VERTICES + "vn 0 0 0\n" + ONE_NORMAL,
+    "faces of two sides": VERTICES + "vn 0 0 1\n" + ONE_NORMAL + "f 1//1 2//1 999//1\n".replace("999", "40"),
     "flat": QUADS + "v 0.5 0.5 0\nf 2 7 4 1\nf 2 5 6 3\n",
     "colours": VERTICES.replace("\n", " 1 0 0\n") + FACES,
     "no number": VERTICES.replace("v 0.0 ", "v nan ") + FACES,
@@ -75,10 +80,15 @@ def read(package, path):
     return plain, lambda: package("commands.selection").read_file(options)
 
 
+def normalized(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+
 def check_alike(plain, obj, reading):
     found, ours = plain
     assert found.name == obj.name
-    for name in ("positions", "corner_vertex", "face_start", "triangles", "triangle_face", "seams", "sharp"):
+    assert {frozenset(e) for e in ours.surface.sharp.tolist()} == {frozenset(e) for e in reading.surface.sharp.tolist()}
+    for name in ("positions", "corner_vertex", "face_start", "triangles", "triangle_face", "seams"):
         mine, theirs = getattr(ours.surface, name), getattr(reading.surface, name)
         assert mine.dtype == theirs.dtype and np.array_equal(mine, theirs), name
         # Zeros have signs.
@@ -104,18 +114,38 @@ def test_what_blender_decides_is_left_to_it(package, tmp_path, name):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_files_of_blender_are_read_as_it_reads_them(package, tmp_path, smooth):
+@pytest.mark.parametrize("kind", ["uv_sphere", "cube", "torus", "grid"])
+def test_files_of_blender_are_read_as_it_reads_them(package, tmp_path, kind, smooth):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.ops.mesh.primitive_monkey_add()
+    getattr(bpy.ops.mesh, f"primitive_{kind}_add")()
     if smooth:
         bpy.ops.object.shade_smooth()
     bpy.ops.wm.obj_export(filepath=str(tmp_path / "in.obj"), export_materials=False)
     plain, blender = read(package, tmp_path / "in.obj")
-    # The normals of flat faces make edges sharp.
-    assert (plain is not None) == smooth
-    if plain:
+    assert plain is not None
+    ((obj, reading),) = blender()
+    check_alike(plain, obj, reading)
+    # The normals of flat faces make edges sharp where these are no plane.
+    assert (len(plain[1].surface.sharp) > 0) == (not smooth and kind != "grid")
+
+
+@pytest.mark.parametrize("kinds", [2, 3, 30])
+def test_edges_between_normals_are_sharp(package, tmp_path, kinds):
+    (points, triangles), rng = icosphere(2), np.random.default_rng(kinds)
+    lines = ["v {:.6f} {:.6f} {:.6f}".format(*v) for v in points]
+    for _ in range(4):
+        normals = ["vn {:.4f} {:.4f} {:.4f}".format(*n) for n in normalized(rng.normal(size=(kinds, 3)))]
+        named = rng.integers(1, kinds + 1, triangles.shape)
+        faces = [
+            "f {}//{} {}//{} {}//{}".format(*np.stack([f + 1, k], axis=1).ravel())
+            for f, k in zip(triangles, named, strict=True)
+        ]
+        (tmp_path / "in.obj").write_text("\n".join([*lines, *normals, *faces]))
+        plain, blender = read(package, tmp_path / "in.obj")
+        assert plain is not None
         ((obj, reading),) = blender()
         check_alike(plain, obj, reading)
+        assert len(plain[1].surface.sharp) > 0
 
 
 @pytest.mark.parametrize("name", ["triangles", "all", "quads"])

@@ -1,7 +1,7 @@
 """Read small OBJ files of which Blender would make what stands in them: its start takes longer than their unwrap.
 
 Whatever Blender decides of a file is left to it: faces that it drops, vertices that it leaves out, corners of which it
-makes triangles in its own way, normals that make edges sharp, coordinates that it rounds.
+makes triangles in its own way, normals that hardly differ, coordinates that it rounds.
 """
 
 from __future__ import annotations
@@ -31,19 +31,25 @@ FARTHEST = 16.0
 GREATEST = 1e9
 # Cosine of the angle between normals of halves of a quad up to which rounding may decide which diagonal is taken.
 UNDECIDED = 1e-3
+# One minus the cosine of the angle between normals that Blender takes for one, and for two: it parts them at 1e-4.
+SAME = 1e-6
+OTHER = 1.2e-4
+# Of shorter ones it makes its own.
+LEAST_NORMAL = 0.5
 
 
 @dataclass(frozen=True)
 class PlainObj:
     """One mesh as Blender would hold it: its name, and its `Imported` without a layer where it has no UVs.
 
-    triangles (m,3) of corners; triangle_face (m,)
+    triangles (m,3) of corners; triangle_face (m,); sharp (k,2) vertex pairs of the edges that its normals make sharp
     """
 
     name: str
     mesh: Imported
     triangles: np.ndarray
     triangle_face: np.ndarray
+    sharp: np.ndarray
 
     @property
     def uv(self) -> np.ndarray | None:
@@ -75,15 +81,16 @@ def read_plain(path: Path) -> PlainObj | None:
     uvs, normals = ([words[k] for words in named if len(words) > k and words[k]] for k in (1, 2))
     if uvs and (len(uvs) < len(named) or text.corner_uv.min() < 0):
         return None
-    if normals and (len(normals) < len(named) or not _is_smooth(text, np.array(normals).astype(np.int64))):
-        return None
+    sharp = np.zeros((0, 2), np.int64) if not normals else None
+    if len(normals) == len(named):
+        sharp = _sharp_edges(text, np.array(normals).astype(np.int64) - 1, sizes)
     positions = text.positions.astype(np.float32)
     triangles = _triangles(positions[text.corner_vertex].astype(float), text.face_start, sizes)
-    if triangles is None:
+    if triangles is None or sharp is None:
         return None
     layers = (text.uv[text.corner_uv].astype(np.float32),) if uvs else ()
     mesh = Imported(path.stem, positions, text.corner_vertex, text.face_start, layers, 0)
-    return PlainObj(path.stem, mesh, triangles, np.repeat(np.arange(len(sizes)), sizes - 2))
+    return PlainObj(path.stem, mesh, triangles, np.repeat(np.arange(len(sizes)), sizes - 2), sharp)
 
 
 def _is_whole(text: ObjText, sizes: np.ndarray) -> bool:
@@ -106,11 +113,34 @@ def _is_near(positions: np.ndarray) -> bool:
     return bool(farthest < GREATEST and farthest <= FARTHEST * np.ptp(positions, axis=0).max())
 
 
-def _is_smooth(text: ObjText, normal: np.ndarray) -> bool:
-    """Whether the corners of each vertex name one normal (c,) that is there: several would make edges sharp."""
-    count = sum(line.startswith(b"vn") for line in text.lines)
-    pairs = np.unique(text.corner_vertex + normal * len(text.positions))
-    return bool(normal.min() > 0 and normal.max() <= count) and len(pairs) == len(text.positions)
+def _sharp_edges(text: ObjText, named: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
+    """Vertex pairs (k,2) of edges with other normals on either side at one of their ends; None where Blender may find
+    others. named : the normal (c,) of every corner"""
+    normals = np.array([line.split()[1:4] for line in text.lines if line.startswith(b"vn")]).astype(float)
+    if named.min() < 0 or named.max() >= len(normals):
+        return None
+    length = np.linalg.norm(normals[named], axis=1)
+    here = text.corner_vertex
+    after = np.arange(1, len(here) + 1)
+    after[text.face_start[1:] - 1] = text.face_start[:-1]
+    there, n = here[after], len(text.positions)
+    key, back = here * n + there, there * n + here
+    order = np.argsort(key)
+    if not (length > LEAST_NORMAL).all() or (np.diff(key[order]) == 0).any():
+        return None
+    place = np.minimum(np.searchsorted(key[order], back), len(key) - 1)
+    is_inside = key[order[place]] == back
+    edge = np.flatnonzero(is_inside & (here < there))
+    twin, direction = order[place[edge]], normals[named] / length[:, None]
+    ends = [(edge, after[twin]), (after[edge], twin)]
+    apart = np.stack([1 - np.einsum("ij,ij->i", direction[a], direction[b]) for a, b in ends])
+    if ((apart > SAME) & (apart < OTHER)).any():
+        return None
+    found = edge[(apart >= OTHER).any(axis=0)]
+    if np.isin(np.stack([here[found], there[found]]), [here[~is_inside], there[~is_inside]]).any():
+        # At the ends of a boundary vertex's fan it compares the last face with the first, and marks another edge.
+        return None
+    return np.stack([here[found], there[found]], axis=1)
 
 
 def _triangles(points: np.ndarray, start: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
