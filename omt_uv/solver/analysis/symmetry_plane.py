@@ -33,6 +33,15 @@ SAMPLES = 12_000
 MOST_SAMPLES = 48_000
 COMPARED = 250
 PAIRED = 4000
+# Images that lie farther from the surface, over its size, are not looked for any nearer where planes are compared:
+# those of the best planes never do, and looking takes twice as long.
+FAR = 0.08
+# Points at a leaf of the tree that is asked for distances alone, which it is asked most often.
+AT_LEAF = 30
+# Samples near an image that are remembered: as long as it moves by little, its nearest one is among these.
+REMEMBERED = 8
+# Share of a distance that rounding leaves of it in any case.
+SURE = 1 - 1e-9
 # Sides of triangles are divided to the nearest number of cells, ties apart.
 EVENLY = 0.5 - 1e-6
 # Planes whose residuals differ by less are as good as each other.
@@ -184,30 +193,64 @@ class _Samples:
         self.few, self.many = (self.points[_evenly(area[order], count)] for count in (COMPARED, PAIRED))
         self.spacing = float(np.sqrt(areas.sum() / SAMPLES))
         self.tree = cKDTree(self.points)
+        self.quick = cKDTree(self.points, leafsize=AT_LEAF, compact_nodes=False)
 
-    def distances(self, normal: np.ndarray, offset: float, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the images of points (p,3): distances (p,) from the surface, signed distances (p,) from the planes of the
-        nearest samples, and the normals (p,3) of these planes.
+    def distances(self, normal: np.ndarray, offset: float, near: _Nearest) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the images of the points (p,3) of `near`: distances (p,) from the surface, signed distances (p,) from the
+        planes of the nearest samples, and the normals (p,3) of these planes.
 
         Samples lie apart, the surface does not: beside its plane an image may be as far from a sample as these are.
         """
-        image = p - 2 * (p @ normal - offset)[:, None] * normal
-        far, found = self.tree.query(image)
+        image = near.p - 2 * (near.p @ normal - offset)[:, None] * normal
+        far, found = near.query(image)
         facing = self.normals[found]
         off = ((image - self.points[found]) * facing).sum(axis=1)
         beside = np.sqrt(np.maximum(far**2 - off**2, 0))
         return np.hypot(off, np.maximum(beside - self.spacing, 0)), off, facing
 
-    def compared(self, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-        """Trimmed root mean square (k,) of the distances of a few images in planes (k,3), (k,)."""
+    def compared(self, normals: np.ndarray, offsets: np.ndarray, far: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+        """Trimmed root mean square (k,) of the distances of a few images in planes (k,3), (k,), where what is farther
+        than `far` counts as that, and whether (k,) bool nothing of it was."""
         p = self.few
         image = p - 2 * (p @ normals.T - offsets).T[:, :, None] * normals[:, None]
-        return _trimmed(self.tree.query(image.reshape(-1, 3))[0].reshape(len(normals), -1))
+        found = self.quick.query(image.reshape(-1, 3), distance_upper_bound=far)[0].reshape(len(normals), -1)
+        worth, farthest = _trimmed(np.minimum(found, far))
+        return worth, farthest < far
 
     def is_flat(self, normal: np.ndarray, offset: float, residual: float) -> bool:
         """Whether the samples lie in a plane, more or less, so that a small residual says nothing."""
         depth = float(np.sqrt(((self.points @ normal - offset) ** 2).mean()))
         return residual >= FLAT * depth
+
+
+class _Nearest:
+    """The samples nearest to images of points (p,3) that move from one round to the next, less and less.
+
+    A few samples near each image are remembered, and how far off the last of them was: while the image has moved by
+    less than what another one would have to, none but these can be the nearest.
+    """
+
+    def __init__(self, samples: _Samples, p: np.ndarray):
+        self.p, self._tree, self._points = p, samples.tree, samples.points
+        self._ranks = np.arange(1, min(REMEMBERED, len(self._points)) + 1)
+        self._at, self._beyond = p.copy(), np.full(len(p), -np.inf)
+        self._found = np.zeros((len(p), len(self._ranks)), np.int64)
+        self._near = np.zeros((*self._found.shape, 3))
+
+    def query(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance (p,) and number (p,) of the sample nearest to each image (p,3)."""
+        x, y, z = ((image[:, None] - self._near) ** 2).transpose(2, 0, 1)
+        squares = x + y + z
+        best = squares.argmin(axis=1)
+        of_each = np.arange(len(image)), best
+        far, found = np.sqrt(squares[of_each]), self._found[of_each]
+        away = np.flatnonzero(far + np.linalg.norm(image - self._at, axis=1) >= SURE * self._beyond)
+        if len(away):
+            distance, number = self._tree.query(image[away], self._ranks)
+            self._at[away], self._beyond[away] = image[away], distance[:, -1]
+            self._found[away], self._near[away] = number, self._points[number]
+            far[away], found[away] = distance[:, 0], number[:, 0]
+        return far, found
 
 
 def _cells(areas: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -231,10 +274,10 @@ def _evenly(areas: np.ndarray, count: int) -> np.ndarray:
     return np.unique(np.searchsorted(below, below[-1] * (np.arange(count) + 0.5) / count).clip(max=len(areas) - 1))
 
 
-def _trimmed(distance: np.ndarray) -> np.ndarray:
-    """Root mean square (k,) of the least of the distances (k,c)."""
+def _trimmed(distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean square (k,) of the least of the distances (k,c), and the greatest (k,) of these."""
     kept = np.sort(distance, axis=1)[:, : int(KEPT * distance.shape[1])]
-    return np.sqrt((kept**2).mean(axis=1))
+    return np.sqrt((kept**2).mean(axis=1)), kept[:, -1]
 
 
 def _near_plane(positions: np.ndarray, triangles: np.ndarray, near: float, side: np.ndarray) -> SymmetryPlane | None:
@@ -246,9 +289,8 @@ def _near_plane(positions: np.ndarray, triangles: np.ndarray, near: float, side:
     samples = _Samples(scaled @ axes, triangles)
     normals = np.concatenate([np.eye(3), _principal(samples.points), half_sphere(DIRECTIONS)])
     offsets = normals @ samples.points.mean(axis=0)
-    worth = samples.compared(normals, offsets)
     side = side @ axes
-    chosen = _chosen(normals, worth, side)
+    chosen = _chosen_among(samples, normals, offsets, side)
     found = [_refined(samples, normals[k], offsets[k], samples.few, ROUNDS) for k in chosen]
     found = [plane for plane in found if not samples.is_flat(*plane)]
     if not found:
@@ -289,6 +331,18 @@ def _principal(points: np.ndarray) -> np.ndarray:
     return np.linalg.eigh(moved.T @ moved)[1].T
 
 
+def _chosen_among(samples: _Samples, normals: np.ndarray, offsets: np.ndarray, side: np.ndarray) -> list[int]:
+    """The candidates `_chosen` by what all planes (k,3), (k,) are worth."""
+    worth, is_known = samples.compared(normals, offsets, FAR)
+    chosen = list(_chosen(normals, worth, side))
+    if not is_known[chosen].all():
+        # A better one may be among them: others are worth no less than what is known of them.
+        rest = ~is_known
+        worth[rest], _ = samples.compared(normals[rest], offsets[rest])
+        chosen = list(_chosen(normals, worth, side))
+    return chosen
+
+
 def _chosen(normals: np.ndarray, worth: np.ndarray, side: np.ndarray) -> Iterator[int]:
     """The best candidates that are not close to a better one; of even ones, those most across `side` (3,) first."""
     left = np.lexsort((-np.abs(normals @ side), np.round(worth / EVEN)))
@@ -306,8 +360,9 @@ def _refined(
 
     Gauss and Newton's steps on the distances of the images from the planes of their nearest points.
     """
+    near = _Nearest(samples, p)
     for _ in range(rounds):
-        far, off, facing = samples.distances(normal, offset, p)
+        far, off, facing = samples.distances(normal, offset, near)
         kept = far <= np.quantile(far, KEPT)
         depth = p @ normal - offset
         # An image moves by -2 (t @ p) n - 2 depth t when the normal turns by t, by 2 n per offset.
@@ -323,4 +378,4 @@ def _refined(
         normal, offset = turned / length, float((offset + step[2]) / length)
         if np.abs(step).max() < CONVERGED:
             break
-    return normal, offset, float(_trimmed(samples.distances(normal, offset, p)[0][None])[0])
+    return normal, offset, float(_trimmed(samples.distances(normal, offset, near)[0][None])[0][0])

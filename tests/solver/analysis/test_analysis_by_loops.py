@@ -397,6 +397,7 @@ def samples_of(points, normals, spacing):
     found = object.__new__(symmetry_plane._Samples)
     found.points, found.normals, found.spacing = points, normals, spacing
     found.few, found.tree = points, cKDTree(points)
+    found.quick = found.tree
     return found
 
 
@@ -407,7 +408,7 @@ def test_distances_of_images_are_from_planes_of_samples_beyond_their_spacing():
     samples = samples_of(points, normals, 0.3)
     normal, offset = np.array([0.6, 0.8, 0.0]), 0.2
     p = rng.normal(size=(7, 3))
-    far, off, facing = samples.distances(normal, offset, p)
+    far, off, facing = samples.distances(normal, offset, symmetry_plane._Nearest(samples, p))
     for k in range(7):
         image = p[k] - 2 * (p[k] @ normal - offset) * normal
         nearest = np.linalg.norm(points - image, axis=1).argmin()
@@ -416,12 +417,45 @@ def test_distances_of_images_are_from_planes_of_samples_beyond_their_spacing():
         beside = np.linalg.norm(way - depth * normals[nearest])
         assert off[k] == pytest.approx(depth) and far[k] == pytest.approx(np.hypot(depth, max(beside - 0.3, 0)))
         np.testing.assert_array_equal(facing[k], normals[nearest])
-    found = samples.compared(np.stack([normal, -normal]), np.array([offset, -offset]))
+    found, is_known = samples.compared(np.stack([normal, -normal]), np.array([offset, -offset]))
     image = points - 2 * (points @ normal - offset)[:, None] * normal
     away = np.array([np.linalg.norm(points - q, axis=1).min() for q in image])
-    np.testing.assert_allclose(found, symmetry_plane._trimmed(away[None])[0])
+    least = np.sort(away)[: int(0.85 * 30)]
+    np.testing.assert_allclose(found, np.sqrt((least**2).mean()))
+    assert is_known.all()
+    for far, known in ((1.01 * least[-1], True), (0.99 * least[-1], False)):
+        found, is_known = samples.compared(normal[None], np.array([offset]), far)
+        np.testing.assert_allclose(found, np.sqrt((np.minimum(least, far) ** 2).mean()))
+        assert is_known.tolist() == [known]
     depth = np.sqrt(((points @ normal - offset) ** 2).mean())
     assert samples.is_flat(normal, offset, 0.11 * depth) and not samples.is_flat(normal, offset, 0.09 * depth)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-3, 0.05, 1.0])
+def test_nearest_samples_of_what_moves_are_those_of_the_tree(step):
+    rng = np.random.default_rng(1)
+    points, image = rng.normal(size=(500, 3)), rng.normal(size=(40, 3))
+    tree = cKDTree(points)
+    near = symmetry_plane._Nearest(samples_of(points, points, 0.1), image)
+    for _ in range(20):
+        image = image + step * rng.normal(size=image.shape)
+        far, found = near.query(image)
+        expected = tree.query(image)
+        np.testing.assert_array_equal(far, expected[0])
+        np.testing.assert_array_equal(found, expected[1])
+
+
+@pytest.mark.parametrize("far", [0.0, 0.02, 0.05, 0.2])
+def test_planes_are_chosen_as_if_all_distances_were_known(far, monkeypatch):
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(400, 3)) * [0.3, 0.2, 0.1]
+    samples, side = samples_of(points, points, 0.01), np.array([0.0, 1.0, 0.0])
+    normals = rng.normal(size=(60, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    offsets = normals @ points.mean(axis=0)
+    expected = list(symmetry_plane._chosen(normals, samples.compared(normals, offsets)[0], side))
+    monkeypatch.setattr(symmetry_plane, "FAR", far)
+    assert symmetry_plane._chosen_among(samples, normals, offsets, side) == expected
 
 
 def test_distances_across_edges_are_those_over_triangles_laid_flat():
