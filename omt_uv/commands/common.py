@@ -51,12 +51,13 @@ def require_blender() -> None:
 
 
 @contextmanager
-def without_collections() -> Iterator[None]:
-    """Look for no garbage while Blender or numpy is imported for the first time, nor in what that has left, ever.
+def without_collections(module: str = "bpy") -> Iterator[None]:
+    """Look for no garbage while a module is imported for the first time, nor in what that has left, ever.
 
-    It is a hundred thousand objects that stay: to go through them again and again takes a tenth of a small command.
+    Of Blender it is a hundred thousand objects that stay: to go through them again and again takes a tenth of a small
+    command.
     """
-    if "bpy" in sys.modules or not gc.isenabled():
+    if module in sys.modules or not gc.isenabled():
         yield
         return
     gc.disable()

@@ -28,8 +28,8 @@ def read_layers(options: argparse.Namespace, plain: bool = False) -> tuple[list,
 
     plain : the object may be a `PlainObj`, of which nothing but UVs is asked
     """
-    if plain and options.output.suffix.lower() == options.input.suffix.lower() == ".obj":
-        with without_collections():
+    if plain and options.input.suffix.lower() == ".obj":
+        with without_collections("numpy"):
             check_paths(options)
             found = read_plain_file(options)
         if found is not None:

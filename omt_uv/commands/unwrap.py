@@ -17,7 +17,7 @@ from ..settings import (
     SEAMS,
     Settings,
 )
-from .common import drain_shown, refusals, without_collections, write_report
+from .common import drain_shown, refusals, write_report
 from .layers import is_plain, read_layers, write_layers
 from .options import (
     add_area_options,
@@ -103,9 +103,8 @@ def chosen(options: argparse.Namespace) -> Settings:
 
 def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options, plain=True)
-    with without_collections():
-        from ..pipelines.layout import UnwrapJob
-        from ..pipelines.unwrap import lay_out
+    from ..pipelines.layout import UnwrapJob
+    from ..pipelines.unwrap import lay_out
 
     with refusals(objects):
         free, marked = _groups(options, objects)

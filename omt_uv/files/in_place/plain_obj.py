@@ -24,7 +24,7 @@ LINE = re.compile(
     rb"(?:v(?:%b){3}|vt(?:%b){2}|vn(?:%b){3}|f(?:%b){3,4}|(?:(?:o|g|s|usemtl|mtllib)[ \t]|#)[^\\\r\n]*|)[ \t]*\r?"
     % (NUMBER, NUMBER, NUMBER, CORNER)
 )
-# Names that Blender keeps, and is the same in every encoding.
+# Names that Blender keeps, and that are the same in every encoding.
 NAME = re.compile(r"[A-Za-z0-9_ -]{1,60}")
 # Of extents, how far off the origin a mesh may lie: farther off, single precision could round it.
 FARTHEST = 16.0
@@ -40,16 +40,20 @@ LEAST_NORMAL = 0.5
 
 @dataclass(frozen=True)
 class PlainObj:
-    """One mesh as Blender would hold it: its name, and its `Imported` without a layer where it has no UVs.
+    """One mesh as Blender would hold it: its `Imported`, without a layer where it has no UVs.
 
     triangles (m,3) of corners; triangle_face (m,); sharp (k,2) vertex pairs of the edges that its normals make sharp
     """
 
-    name: str
     mesh: Imported
     triangles: np.ndarray
     triangle_face: np.ndarray
     sharp: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Of its object, which is that of the mesh."""
+        return self.mesh.name
 
     @property
     def uv(self) -> np.ndarray | None:
@@ -83,14 +87,14 @@ def read_plain(path: Path) -> PlainObj | None:
         return None
     sharp = np.zeros((0, 2), np.int64) if not normals else None
     if len(normals) == len(named):
-        sharp = _sharp_edges(text, np.array(normals).astype(np.int64) - 1, sizes)
+        sharp = _sharp_edges(text, np.array(normals).astype(np.int64) - 1)
     positions = text.positions.astype(np.float32)
     triangles = _triangles(positions[text.corner_vertex].astype(float), text.face_start, sizes)
     if triangles is None or sharp is None:
         return None
     layers = (text.uv[text.corner_uv].astype(np.float32),) if uvs else ()
     mesh = Imported(path.stem, positions, text.corner_vertex, text.face_start, layers, 0)
-    return PlainObj(path.stem, mesh, triangles, np.repeat(np.arange(len(sizes)), sizes - 2), sharp)
+    return PlainObj(mesh, triangles, np.repeat(np.arange(len(sizes)), sizes - 2), sharp)
 
 
 def _is_whole(text: ObjText, sizes: np.ndarray) -> bool:
@@ -113,7 +117,7 @@ def _is_near(positions: np.ndarray) -> bool:
     return bool(farthest < GREATEST and farthest <= FARTHEST * np.ptp(positions, axis=0).max())
 
 
-def _sharp_edges(text: ObjText, named: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
+def _sharp_edges(text: ObjText, named: np.ndarray) -> np.ndarray | None:
     """Vertex pairs (k,2) of edges with other normals on either side at one of their ends; None where Blender may find
     others. named : the normal (c,) of every corner"""
     normals = np.array([line.split()[1:4] for line in text.lines if line.startswith(b"vn")]).astype(float)
@@ -124,6 +128,7 @@ def _sharp_edges(text: ObjText, named: np.ndarray, sizes: np.ndarray) -> np.ndar
     after = np.arange(1, len(here) + 1)
     after[text.face_start[1:] - 1] = text.face_start[:-1]
     there, n = here[after], len(text.positions)
+    # Edges as their faces run along them: the other face of one runs back.
     key, back = here * n + there, there * n + here
     order = np.argsort(key)
     if not (length > LEAST_NORMAL).all() or (np.diff(key[order]) == 0).any():

@@ -255,11 +255,9 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray) -> AdditiveSchwarz
 
     The order of the vertices is that of their elimination.
     """
-    return (
-        None
-        if hangs_by_few(points, triangles, LARGE_KEPT)
-        else AdditiveSchwarz(points, triangles, SIZE_KEPT, keep=True)
-    )
+    if hangs_by_few(points, triangles, LARGE_KEPT):
+        return None
+    return AdditiveSchwarz(points, triangles, SIZE_KEPT, keep=True)
 
 
 def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int | None = None) -> bool:
