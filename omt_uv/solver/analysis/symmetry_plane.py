@@ -208,14 +208,16 @@ class _Samples:
         beside = np.sqrt(np.maximum(far**2 - off**2, 0))
         return np.hypot(off, np.maximum(beside - self.spacing, 0)), off, facing
 
-    def compared(self, normals: np.ndarray, offsets: np.ndarray, far: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+    def compared(
+        self, normals: np.ndarray, offsets: np.ndarray, beyond: float = np.inf
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Trimmed root mean square (k,) of the distances of a few images in planes (k,3), (k,), where what is farther
-        than `far` counts as that, and whether (k,) bool nothing of it was."""
+        than `beyond` counts as that, and whether (k,) bool nothing of it was."""
         p = self.few
         image = p - 2 * (p @ normals.T - offsets).T[:, :, None] * normals[:, None]
-        found = self.quick.query(image.reshape(-1, 3), distance_upper_bound=far)[0].reshape(len(normals), -1)
-        worth, farthest = _trimmed(np.minimum(found, far))
-        return worth, farthest < far
+        found = self.quick.query(image.reshape(-1, 3), distance_upper_bound=beyond)[0].reshape(len(normals), -1)
+        worth, farthest = _trimmed(np.minimum(found, beyond))
+        return worth, farthest < beyond
 
     def is_flat(self, normal: np.ndarray, offset: float, residual: float) -> bool:
         """Whether the samples lie in a plane, more or less, so that a small residual says nothing."""
