@@ -208,6 +208,31 @@ def test_a_group_about_to_be_made_is_no_search_that_finds_nothing(package):
     assert ("search", "weight_group") in drawn
 
 
+@pytest.mark.parametrize(("group", "kind"), [("eyes", "search"), ("", "search"), ("gone", "field")])
+def test_a_region_without_its_group_keeps_the_name(package, group, kind):
+    """A search would lose a name that no group has; where there is none, or it is one of them, it is chosen."""
+    obj = scenes.bump()
+    obj.vertex_groups.new(name="eyes")
+    obj.omt_uv_regions.rows.add().group = group
+    drawn = []
+
+    class Recorder(Layout):
+        def column(self, **_):
+            return self
+
+        row = column
+
+        def prop(self, data, name, **_):
+            drawn.append(("field", name))
+
+        def prop_search(self, data, name, owner, collection, **_):
+            drawn.append(("search", name))
+
+    (item,) = obj.omt_uv_regions.rows
+    package("panels.tools").UV_UL_omt_regions.draw_item(None, bpy.context, Recorder([]), obj, item, 0, obj, "")
+    assert drawn == [(kind, "group"), ("field", "factor")]
+
+
 def test_strategies_have_plain_words(package):
     for operator, name in (("object.omt_remesh", "strategy"), ("uv.omt_unwrap", "kind")):
         properties = bpy.context.window_manager.operator_properties_last(operator).bl_rna.properties

@@ -22,7 +22,7 @@ from .predicted_scale import ScaleModel
 
 # A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
 GROUND = 1e-6
-# A cut that has so many times the spread asked for, or more, has no arcs left to grow: symmetric ones, mostly.
+# A cut that has more than so many times the spread asked for has no arcs left to grow: symmetric ones, mostly.
 STUCK = 2.0
 
 

@@ -68,6 +68,18 @@ def test_a_queue_gives_each_its_own_texture_and_names_what_fails(package, run, t
     assert found["A"].data.uv_layers and not found["Flat"].data.uv_layers
 
 
+@pytest.mark.parametrize("told", ["3 polygons are folded in the UVs", "2 % of the UV area is under several faces"])
+def test_what_is_folded_or_covered_is_written_unless_it_is_not_to_be(package, run, tmp_path, monkeypatch, told):
+    monkeypatch.setattr(package("pipelines.gate").Gate, "warnings", lambda *_: (told,))
+    scenes.bump()
+    save(tmp_path / "in.blend")
+    words = ["queue", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--quality", "draft"]
+    status, _, err = run(*words, "--strict")
+    assert status == 1 and told in err and "Nothing was written" in err and not (tmp_path / "out.blend").exists()
+    status, _, err = run(*words)
+    assert status == 0 and told in err and (tmp_path / "out.blend").exists()
+
+
 def test_a_time_limit_gives_one_up(run, tmp_path):
     scenes.bump(30, 30, name="Large")
     save(tmp_path / "in.blend")

@@ -65,3 +65,11 @@ def test_a_direction_is_one_down_to_a_millionth(share, directed, turn):
     assert fit_similarity(square, aim).factor == pytest.approx(expected, rel=1e-4)
     # In any unit.
     assert fit_similarity(1e-9 * square, 1e9 * aim).factor == pytest.approx(1e18 * expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(("share", "told"), [(1.5e-6, True), (0.7e-6, False)])
+def test_a_mirror_image_has_no_direction_but_keeps_its_size(share, told):
+    """Of points on a circle, a mirror image fits in no direction; a share of a turn beside it is one from 1e-6 on."""
+    w = np.exp(2j * np.pi * np.arange(12) / 12)
+    found = fit_similarity(w, 3 * (share * 1j * w + w.conj()))
+    assert found.factor == pytest.approx(3j * share if told else 3.0, rel=1e-3)

@@ -103,7 +103,8 @@ def test_cuts_are_compared_at_one_spread(spread, factor):
 def test_the_first_of_even_cuts_is_the_best_and_stuck_is_far_from_its_bound():
     cuts = [coarse_cut_of(c, 1.0) for c in (3.0, 2.0, 2.0 * (1 - 1e-13), 2.5)]
     assert coarse_cut.best_of(cuts) is cuts[1]
-    assert not coarse_cut_of(1, 2.0 * 0.999).is_stuck and coarse_cut_of(1, 2.0 * 1.001).is_stuck
+    assert not coarse_cut_of(1, 2.0 * 0.999).is_stuck and not coarse_cut_of(1, 2.0).is_stuck
+    assert coarse_cut_of(1, 2.0 * 1.001).is_stuck
 
 
 def test_steps_across_edges_are_as_long_as_over_both_triangles_laid_flat():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import meshes
 import numpy as np
+import pytest
 from mesh_checks import topology
 
 from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
@@ -51,3 +52,22 @@ def test_what_does_not_lie_on_another_stays():
     V, F = meshes.annulus()
     joined = join_coincident(V, F)
     assert joined.triangles is F and len(joined.to_reopen) == 0
+
+
+def pillow():
+    """Two strips of two cells back to back: joined, four faces would meet along the edge between the cells."""
+    V, F = meshes.grid(2, 1)
+    return np.concatenate([V, V]), np.concatenate([F, F[:, ::-1] + len(V)])
+
+
+def closed_fan():
+    """Three faces around a vertex, of which two ends lie on one another: joined, one side would have no length."""
+    return np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 1, 0], [1, 0, 0]]), np.array([[0, 1, 2], [2, 1, 3], [0, 2, 3]])
+
+
+@pytest.mark.parametrize("made", [pillow, closed_fan])
+def test_nothing_is_joined_where_that_would_give_no_surface(made):
+    V, F = made()
+    joined = join_coincident(V, F)
+    np.testing.assert_array_equal(joined.triangles, F)
+    assert joined.same.tolist() == list(range(len(V))) and joined.to_reopen.shape == (0, 2)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import halfedges, twins
+from omt_uv.solver.remeshing.edits import split_collapse
 from omt_uv.solver.remeshing.edits.split_collapse import (
     BANDS,
     collapse_edges,
@@ -125,3 +126,16 @@ def test_locked_and_boundary_edges_are_no_interior_ones():
     V, F = meshes.quad_patch()
     assert len(interior_edges(F, np.zeros(0, np.int64))) == 1
     assert len(interior_edges(F, np.array([0 << 32 | 2]))) == 0
+
+
+def test_choosing_ends_after_eight_rounds(monkeypatch):
+    V, F = meshes.grid(60, 60)
+    V = V.copy()
+    V[:, :2] = (1 + V[:, :2]) ** 3
+    tail, head = halfedges(F)
+    h = interior_edges(F, np.zeros(0, np.int64))
+    h, rounds = h[np.argsort(np.linalg.norm(V[tail[h]] - V[head[h]], axis=1))], []
+    sound = split_collapse._sound
+    monkeypatch.setattr(split_collapse, "_sound", lambda *given: rounds.append(len(given[3])) or sound(*given))
+    collapse_edges(V, F, h, np.zeros(len(V), dtype=bool), len(V))
+    assert len(rounds) == 8

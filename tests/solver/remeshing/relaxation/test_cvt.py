@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import meshes
 import numpy as np
+import pytest
 from mesh_checks import angles, topology
 
 from omt_uv.solver.mesh.closest_point import ClosestPoint
@@ -55,3 +56,21 @@ def test_samples_correct_no_cell_that_covers_what_is_seen():
     # Of a mesh that covers a tenth of what is seen, every cell is corrected, to the mass and the middle that are seen.
     small = cvt._sample_correction(0.3 * mesh.points, mesh.triangles, normals, carrier)
     assert small.share[small.mass > 0].mean() > 0.5 and not small.share[small.mass == 0].any()
+
+
+@pytest.mark.parametrize(("rounds", "returns"), [(1, 1), (2, 2), (4, 3), (5, 3), (6, 4)])
+def test_vertices_go_back_to_the_surface_every_second_round_and_at_the_end(rounds, returns):
+    """Before the first round they are on it already, once more."""
+    mesh, carrier = shaken()
+    asked = []
+
+    class Counting:
+        def __getattr__(self, name):
+            return getattr(carrier, name)
+
+        def closest(self, points, normals):
+            asked.append(len(points))
+            return carrier.closest(points, normals)
+
+    relaxed, _ = drain(relax_cvt(mesh, rounds, Counting()))
+    assert len(asked) == 1 + returns and np.abs(relaxed.points[:, 2]).max() < 1e-12
