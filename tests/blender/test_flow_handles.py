@@ -125,3 +125,12 @@ def test_balls_hold_all_of_a_mesh_about_the_middle_of_its_box_and_empties_are_as
     large = wall_of("ball", empty("Large", (1, 2, 3), size=0.5, scale=4.0).name)
     assert large.reach == pytest.approx(2.0, rel=1e-6) and np.allclose(large.middle, (1, 2, 3))
     assert wall_of("free", "") is None
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (0.5, 3.0, 2.0), (-4.0, 1.0, 1.0)])
+def test_a_wall_around_an_empty_is_as_large_as_it_is_drawn_at_most(package, scale):
+    obj = empty("Wall", (1.0, 2.0, 3.0), (0.3, 0.2, 0.1), 0.25)
+    obj.scale = scale
+    bpy.context.view_layer.update()
+    wall, radius = package("blender.volumes.flow_handles").wall_of("ball", "Wall"), 0.25 * max(map(abs, scale))
+    assert np.allclose(np.linalg.norm(wall.points - [1.0, 2.0, 3.0], axis=1), radius, rtol=1e-5)
