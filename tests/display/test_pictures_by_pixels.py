@@ -352,3 +352,18 @@ def test_coverage_of_a_text_is_that_of_its_samples(monkeypatch):
                     p = 10 * points
                     share += all(np.linalg.det([p[(k + 1) % 3] - p[k], (x, y) - p[k]]) >= 0 for k in range(3))
             assert coverage[row, column] == share / 16
+
+
+@pytest.mark.parametrize(("cell", "labelled"), [(23, False), (24, True), (40, True)])
+def test_cells_of_a_checker_have_their_names_from_24_pixels_on(monkeypatch, cell, labelled):
+    """A1 to H8, each in the middle of its cell, in the ink of its circle."""
+    told = []
+    monkeypatch.setattr(patterns, "write", lambda picture, *given: told.append(given))
+    picture = patterns.labelled_checker(patterns.CELLS * cell)
+    assert len(told) == (64 if labelled else 0)
+    for k, (label, x, y, size, colour, align) in enumerate(told):
+        i, j = divmod(k, 8)
+        assert label == f"{'ABCDEFGH'[i]}{j + 1}" and align == "middle" and size == cell / 3
+        assert int(x / cell) == j and int(y / cell) == i and x / cell % 1 == 0.5 and y / cell % 1 == pytest.approx(0.62)
+        mine = picture[i * cell : (i + 1) * cell, j * cell : (j + 1) * cell]
+        assert np.abs(mine - colour).max(axis=2).min() < 0.05

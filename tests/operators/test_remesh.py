@@ -324,3 +324,17 @@ def test_carried_uvs_have_no_fold_and_as_many_islands(count):
     # Texels per area stay what they were, which the source has even to a percent.
     density = new_area / new_space
     assert np.percentile(density, [5, 95]) == pytest.approx(area.sum() / space.sum(), rel=0.25)
+
+
+@pytest.mark.parametrize("applied", [False, True])
+def test_faces_that_are_refused_are_selected_unless_they_are_those_of_modifiers(applied):
+    """What a modifier makes is nothing that could be selected, or mended there."""
+    obj = scenes.add([(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 0, 1), (1, 0, 1), (2, 0, 1)], [(0, 1, 2), (3, 4, 5)])
+    scenes.select([obj])
+    for part in (obj.data.vertices, obj.data.edges, obj.data.polygons):
+        part.foreach_set("select", [False] * len(part))
+    with pytest.raises(RuntimeError, match="No face has an area"):
+        bpy.ops.object.omt_remesh(target_vertices=40, use_modifiers=applied)
+    if bpy.context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    assert [p.select for p in obj.data.polygons] == [not applied] * 2

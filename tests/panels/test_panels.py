@@ -233,6 +233,17 @@ def test_a_region_without_its_group_keeps_the_name(package, group, kind):
     assert drawn == [(kind, "group"), ("field", "factor")]
 
 
+def test_settings_of_an_operator_that_draws_none_stand_one_below_the_other(package, monkeypatch):
+    section = package("panels.section")
+    module = package("operators.unwrap")
+    monkeypatch.delattr(module, "draw_settings")
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    record = []
+    section.draw_settings(Layout(record), "uv.omt_unwrap", properties)
+    shown = [p.identifier for p in properties.bl_rna.properties if p.identifier != "rna_type" and not p.is_hidden]
+    assert record == shown and len(shown) > 5
+
+
 def test_strategies_have_plain_words(package):
     for operator, name in (("object.omt_remesh", "strategy"), ("uv.omt_unwrap", "kind")):
         properties = bpy.context.window_manager.operator_properties_last(operator).bl_rna.properties

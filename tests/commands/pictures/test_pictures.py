@@ -59,3 +59,10 @@ def test_open_meshes_have_no_diagram_of_the_sphere(run, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     status, _, err = run("diagram", tmp_path / "in.blend", "-o", tmp_path / "d.obj", "--domain", "sphere")
     assert status == 1 and "not closed" in err and not (tmp_path / "d.obj").exists()
+
+
+def test_cells_as_text_count_their_vertices_from_one(package):
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0.123456789], [0, 1, 0]])
+    text = package("commands.pictures.diagram").obj_text(vertices, [np.array([0, 1, 2]), np.array([0, 2, 3])])
+    lines = text.splitlines()
+    assert lines[4:] == ["f 1 2 3", "f 1 3 4"] and lines[2] == "v 1 1 0.123456789" and text.endswith("4\n")

@@ -34,6 +34,20 @@ def test_what_is_inside_flows_along():
     assert (np.linalg.norm(shapes[1] - shapes[0].mean(axis=0), axis=1) < 1.2).all()
 
 
+@pytest.mark.parametrize("owner", [0, 1, -1])
+def test_a_handle_moves_the_vertices_of_its_own_body(owner):
+    """They are met to the bit; one of no body takes what is there along, and is met by none."""
+    bodies = two_bodies()
+    body = bodies[max(owner, 0)]
+    near = body.positions[:, 2].argsort()[-5:]
+    handle = FlowHandle(body.positions[near], body.positions[near] + [0.0, 0.02, 0.04], near)
+    found = drain(flow_bodies(FlowJob(bodies, ((owner, handle),))))
+    (shapes,) = found.frames
+    exact = [np.array_equal(shape[near], handle.end) for shape in shapes]
+    assert exact == [owner == k for k in range(2)]
+    np.testing.assert_allclose(shapes[max(owner, 0)][near], handle.end, atol=0.01)
+
+
 def test_faces_that_newly_meet_are_told_of_their_body():
     """A spike through the other side, which is held."""
     V, F = icosphere(2)

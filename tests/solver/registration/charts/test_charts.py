@@ -126,3 +126,14 @@ def test_where_the_source_stands_does_not_count_with_landmarks_that_turn_it(tori
     found = drain(register_charts((turned, F, seams), (W + [5, -3, 8], G, others), landmarks))
     off = np.linalg.norm(found.forward.positions(W, G) - placed(at), axis=1)
     assert found.met.all() and found.flipped == 0 and off.max() < 0.2 and off.mean() < 0.05
+
+
+def test_landmarks_that_are_no_corners_tell_how_far_they_are_off(tori):
+    """In shares of the greatest extent of the target; within charts they are met."""
+    (V, F, seams, _), (W, G, others, _) = tori
+    here = np.array([4 * 12 + 6, 18 * 12 + 3, 9 * 12 + 9, 15 * 12 + 8, 2 * 12 + 2])
+    there = np.array([6 * 16 + 8, 27 * 16 + 4, 13 * 16 + 12, 22 * 16 + 11, 3 * 16 + 3])
+    found = drain(register_charts((V, F, seams), (W, G, others), vertex_landmarks((here, F), (there, G))))
+    off = np.linalg.norm(found.forward.positions(W, G)[here] - W[there], axis=1) / np.ptp(W, axis=0).max()
+    assert found.residuals.shape == (5,) and found.residuals == pytest.approx(off, abs=1e-9)
+    assert found.met.all()
