@@ -1,0 +1,104 @@
+"""What is exactly at a bound belongs to one side of it, and the next number to the other."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import meshes
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from omt_uv.solver.arranging import congruence
+from omt_uv.solver.globe import rotation
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.options import MOST_ASPECT, MapOptions
+from omt_uv.solver.refinement import initial_maps, refine
+from omt_uv.solver.refinement.continuation_rules import LOOSE, Quality, first_pressure
+
+
+def test_markers_have_a_middle_beyond_a_millionth_and_none_at_it():
+    least = rotation.LEAST_DISTANCE
+    with pytest.raises(rotation.MarkerError, match="have no middle"):
+        rotation._direction(np.array([least, 0.0, 0.0]))
+    np.testing.assert_allclose(rotation._direction(np.array([0.0, np.nextafter(least, 1), 0.0])), [0, 1, 0])
+
+
+def test_a_meridian_may_be_a_millionth_from_the_pole_and_no_nearer():
+    least = rotation.LEAST_DISTANCE
+    assert rotation._equator_angle(np.array([0.0, -least, 1.0]), "meridian") == least
+    with pytest.raises(rotation.MarkerError, match="lies at a pole"):
+        rotation._equator_angle(np.array([0.0, -np.nextafter(least, 0), 1.0]), "meridian")
+
+
+def test_the_aspect_of_a_rectangle_stays_below_its_bound():
+    assert MapOptions(aspect=float(np.nextafter(MOST_ASPECT, 0))).aspect < MOST_ASPECT
+    for aspect in (MOST_ASPECT, np.nextafter(0.0, -1)):
+        with pytest.raises(ValueError, match="the aspect of a rectangle must lie in"):
+            MapOptions(aspect=float(aspect))
+    assert MapOptions(aspect=0.0).aspect == 0
+
+
+@pytest.mark.parametrize("balance", [np.nextafter(0.0, -1), np.nextafter(1.0, 2)])
+def test_a_balance_is_a_share(balance):
+    assert MapOptions(balance=0.0).balance == 0 and MapOptions(balance=1.0).balance == 1
+    with pytest.raises(ValueError, match="balance must lie in"):
+        MapOptions(balance=float(balance))
+
+
+def test_a_disk_is_crowded_above_its_bound(monkeypatch):
+    V, F = meshes.comb()
+    loop, area = boundary_loops(F)[0], face_areas(V, F)
+    arcs, shares = initial_maps.arcs_of_parts(F, loop, area)
+    found = float(np.maximum(arcs - shares, 0).sum())
+    for bound, crowded in ((found, False), (np.nextafter(found, 0), True)):
+        monkeypatch.setattr(initial_maps, "CROWDED", bound)
+        assert initial_maps.is_crowded(F, loop, area) == crowded
+
+
+@pytest.mark.parametrize(("more", "swept"), [(0, False), (1, True)])
+def test_steps_are_followed_by_sweeps_in_large_meshes_with_a_region_alone(monkeypatch, more, swept):
+    V, F = meshes.grid(4, 4)
+    monkeypatch.setattr(refine, "SWEPT_ABOVE", len(V) - more)
+    mesh, given = (
+        SimpleNamespace(vertices=V, triangles=F, pins=None),
+        {"polygon": None, "region": np.ones(len(F), bool)},
+    )
+    faces = SimpleNamespace(**given)
+    assert (refine._smoother(mesh, faces, 0.0) is not None) == swept
+    assert refine._smoother(mesh, faces, 0.5) is None
+    assert refine._smoother(mesh, SimpleNamespace(**given | {"region": None}), 0.0) is None
+    assert refine._smoother(mesh, SimpleNamespace(**given | {"polygon": np.arange(len(F))}), 0.0) is None
+    assert refine._smoother(SimpleNamespace(**vars(mesh) | {"pins": 1}), faces, 0.0) is None
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("balance", [0.0, 0.5])
+@pytest.mark.parametrize("tolerance", [np.nextafter(LOOSE, 0), LOOSE])
+def test_the_first_pressure_is_small_for_free_exact_drafts_alone(free, balance, tolerance):
+    quality = Quality(tolerance=float(tolerance), **{f: 1 for f in Quality.__dataclass_fields__ if f != "tolerance"})
+    found = first_pressure(quality, balance, free)
+    assert (found < first_pressure(quality, 0.5, False)) == (free and balance == 0 and tolerance == LOOSE)
+
+
+def test_images_of_vertices_are_as_near_as_is_asked_and_one_of_each():
+    V, F = meshes.grid(3, 3)
+    tree, image = cKDTree(V), V + [0.0, 0.0, 0.25]
+    assert congruence._checked(image, tree, F, F, 0.25).tolist() == list(range(len(V)))
+    assert congruence._checked(image, tree, F, F, np.nextafter(0.25, 0)) is None
+    twice = image.copy()
+    twice[0] = image[1]
+    assert congruence._checked(twice, tree, F, F, 0.5) is None
+
+
+@pytest.mark.parametrize(("more", "same"), [(0, False), (1, True)])
+def test_more_than_half_of_the_sides_of_triangles_stay(monkeypatch, more, same):
+    """Of 33 sides of two strips, so many that the share is exactly the bound, or just beyond it."""
+    V, F = meshes.grid(3, 3)
+    other = np.concatenate([F[:9], np.roll(F[9:], 1, axis=0)[:, ::-1]])
+    one, two = (np.unique(np.sort(np.stack([f.ravel(), np.roll(f, -1, axis=1).ravel()]), axis=0), axis=1).T.tolist()
+                for f in (F, other))  # fmt: skip
+    share = np.mean([side in two for side in one])
+    monkeypatch.setattr(congruence, "SAME_SIDES", share if not more else np.nextafter(share, 0))
+    assert (congruence._checked(V, cKDTree(V), F, other, 0.1) is not None) == same
