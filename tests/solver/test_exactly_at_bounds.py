@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from omt_uv.solver import freed_memory
 from omt_uv.solver.arranging import congruence
+from omt_uv.solver.conformal import rectangle_to_disk
+from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.flows import flow_map
 from omt_uv.solver.globe import rotation
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -102,3 +106,33 @@ def test_more_than_half_of_the_sides_of_triangles_stay(monkeypatch, more, same):
     share = np.mean([side in two for side in one])
     monkeypatch.setattr(congruence, "SAME_SIDES", share if not more else np.nextafter(share, 0))
     assert (congruence._checked(V, cKDTree(V), F, other, 0.1) is not None) == same
+
+
+@pytest.mark.parametrize(("function", "bound"), [("give_back_of", "MANY"), ("give_back_often", "VERY_MANY")])
+def test_what_is_free_is_given_back_for_larger_meshes_than_the_bound(monkeypatch, function, bound):
+    given = []
+    monkeypatch.setattr(freed_memory, "give_back", lambda: given.append(1))
+    getattr(freed_memory, function)(getattr(freed_memory, bound))
+    assert not given
+    getattr(freed_memory, function)(getattr(freed_memory, bound) + 1)
+    assert given == [1]
+
+
+@pytest.mark.parametrize(("kind", "bound"), [("missed", "MISSED"), ("volume", "CHANGED")])
+def test_a_flow_warns_of_more_than_its_bounds(kind, bound):
+    least = getattr(flow_map, bound)
+    for value, count in ((least, 0), (float(np.nextafter(least, 1)), 1)):
+        missed, volumes = (value, np.zeros(2)) if kind == "missed" else (0.0, np.array([0.0, -value]))
+        told = flow_map._warnings(missed, volumes, 0)
+        assert len(told) == count
+    assert all(("set to their ends" in text) == (kind == "missed") for text in told)
+    assert flow_map._warnings(0.0, np.zeros(0), 0) == () and len(flow_map._warnings(1.0, np.ones(1), 2)) == 3
+
+
+def test_conformal_rectangles_are_as_slim_as_double_precision_holds():
+    corners = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    most = rectangle_to_disk.MAX_ASPECT
+    assert np.isfinite(rectangle_to_disk.rectangle_to_disk(corners, most)).all()
+    assert np.isfinite(rectangle_to_disk.rectangle_to_disk(corners * [1.0, 1 / most], 1 / most)).all()
+    with pytest.raises(PrecisionError, match="its modulus is"):
+        rectangle_to_disk.rectangle_to_disk(corners, float(np.nextafter(most, np.inf)))
