@@ -285,3 +285,26 @@ def test_the_wheel_widens_and_narrows_the_reach_while_it_is_dragged(name, monkey
     np.testing.assert_allclose(radii[3:5], radii[1::-1], rtol=1e-6)
     assert radii[5] < radii[0]
     operator._drag.restore()
+
+
+@pytest.mark.parametrize("editing", [False, True])
+def test_faces_that_newly_meet_are_told_and_selected_outside_of_edit_mode(package, editing):
+    """In Edit Mode the selection is what moves next."""
+    one, two = scenes.bump(3, 3, name="One"), scenes.bump(3, 3, name="Two", offset=3.0)
+    for obj in (one, two):
+        for part in (obj.data.vertices, obj.data.edges, obj.data.polygons):
+            part.foreach_set("select", [False] * len(part))
+    scenes.select([one, two])
+    if editing:
+        bpy.ops.object.mode_set(mode="EDIT")
+    told = []
+    operator = SimpleNamespace(report=lambda kind, text: told.append((kind, text)))
+    crossing = (np.zeros(0, int), np.array([1, 4]))
+    package("operators.volumes.flow").OBJECT_OT_omt_flow._show_crossing(operator, bpy.context, [one, two], crossing)
+    ((kind, text),) = told
+    assert kind == {"WARNING"} and text.startswith("Two: Faces that newly pass through one another (2): 1, 4")
+    if editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    assert [p.index for p in two.data.polygons if p.select] == ([] if editing else [1, 4])
+    assert not any(p.select for p in one.data.polygons)
+    assert editing or tuple(bpy.context.scene.tool_settings.mesh_select_mode) == (False, False, True)
