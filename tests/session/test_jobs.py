@@ -23,3 +23,16 @@ def test_a_job_waits_runs_and_ends_with_its_reason_and_without_its_work(package,
     assert (job.state, job.reason) == ("RUNNING", "") and 0 <= job.seconds < 60
     job.end(state, reason)
     assert (job.state, job.progress, job.reason, job.steps, closed) == (state, progress, reason, None, [True])
+
+
+@pytest.mark.parametrize("worked", [True, False])
+def test_a_job_that_is_stopped_waits_again(package, worked):
+    """Its work is thrown away, and what has ended stays as it ended."""
+    job = package("session.queue").Job("Box")
+    job.begin(iter(()) if worked else (x for x in (0.5,)))
+    job.close()
+    assert (job.state, job.steps) == ("WAITING", None)
+    job.begin(iter(()))
+    job.end("DONE")
+    job.close()
+    assert (job.state, job.progress) == ("DONE", 1.0)

@@ -42,3 +42,24 @@ def test_menus_of_presets_list_ours_while_we_are_registered(package):
     assert ours not in bpy.utils.preset_paths("operator/uv.omt_unwrap")
     presets.register_folder()
     assert ours in bpy.utils.preset_paths("operator/uv.omt_unwrap")
+
+
+@pytest.mark.parametrize("bad", ["op.margin = 1e999", "op.margin = 'wide'", "op.seams = 'NONE_SUCH'"])
+@pytest.mark.parametrize("chosen", [None, 24])
+def test_a_preset_that_cannot_be_used_leaves_every_setting_as_it_was(package, tmp_path, bad, chosen):
+    """Those that were chosen are, and those that were not still follow their defaults."""
+    presets, path = package("session.presets"), tmp_path / "bad.py"
+    path.write_text(f"op.max_shear = 1.5\nop.texture_size = 512\n{bad}\n")
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    for name in ("max_shear", "texture_size", "margin", "seams"):
+        properties.property_unset(name)
+    if chosen is not None:
+        properties.margin = properties.texture_size = chosen
+        properties.seams = "CHARTS"
+    names = ("max_shear", "texture_size", "margin", "seams")
+    before = {name: (getattr(properties, name), properties.is_property_set(name)) for name in names}
+    with pytest.raises(presets.PresetError, match=r"bad\.py cannot be used"):
+        presets.choose(path, properties)
+    assert {name: (getattr(properties, name), properties.is_property_set(name)) for name in names} == before
+    for name in names:
+        properties.property_unset(name)
