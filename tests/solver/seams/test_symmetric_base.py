@@ -1,5 +1,7 @@
 """Symmetric bodies become disks symmetrically, handles or not, and scans that nearly are get seams that nearly are."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.seams import search
 from omt_uv.solver.seams.search import SeamSearch
-from omt_uv.solver.seams.symmetric_base import symmetric_base
+from omt_uv.solver.seams.symmetric_base import _paths, symmetric_base
 
 RINGS, SECTORS = 24, 48
 
@@ -92,3 +94,23 @@ def test_seams_of_a_scan_are_nearly_symmetric():
     seam = surface.positions[np.unique(seams_of(surface, 0.004))]
     far, _ = cKDTree(seam).query(seam * [-1, 1, 1])
     assert len(seam) > 8 and far.max() < 0.5
+
+
+@pytest.mark.parametrize("loop", [3, 4, 5, 6])
+@pytest.mark.parametrize("tail", [0, 2])
+def test_paths_of_a_cut_have_every_edge_once_and_a_loop_is_two_of_them(loop, tail):
+    """A loop at a boundary vertex, or at the end of a path from there."""
+    line = np.column_stack([np.arange(tail), np.arange(1, tail + 1)])
+    round_ = tail + np.arange(loop)
+    ends = np.concatenate([line, np.column_stack([round_, np.roll(round_, -1)]), [[90, 91]]])
+    boundary = np.isin(np.arange(92), [0, 90])
+    cut = np.arange(len(ends)) < tail + loop
+    component = SimpleNamespace(
+        vertex_count=92, ends=ends, cost=np.linspace(1, 2, len(ends)), on_boundary=lambda: boundary
+    )
+    paths = _paths(component, cut)
+    steps = [tuple(sorted(step)) for path in paths for step in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)]
+    assert sorted(steps) == sorted(tuple(sorted(e)) for e in ends[cut].tolist())
+    assert len(paths) == 2 + (tail > 0)
+    halves = [path for path in paths if tail in path and (path.max() > tail)]
+    assert len(halves) == 2 and set(halves[0]) & set(halves[1]) == {halves[0][0], halves[0][-1]}
