@@ -71,3 +71,16 @@ def test_the_cost_is_that_of_the_moments(sites, site_weights):
 def test_a_known_triangulation_gives_the_same_cells(sites, site_weights):
     known = power_diagram(sites, site_weights, Disk(), by_hull(sites, site_weights))
     np.testing.assert_array_equal(known.area, power_diagram(sites, site_weights, Disk()).area)
+
+
+@pytest.mark.parametrize("domain", [Disk(), Rectangle(2.0, 1.0)], ids=["disk", "rectangle"])
+@pytest.mark.parametrize("heavy", [0, 3])
+def test_a_cell_that_weighs_more_than_all_has_the_whole_domain(domain, heavy):
+    """No side of a cell then crosses the boundary."""
+    sites = np.array([[0.1, 0.2], [0.3, -0.1], [-0.2, 0.15], [0.05, -0.3]])
+    weights = np.where(np.arange(4) == heavy, 50.0, 0.0)
+    even = power_diagram(sites, np.zeros(4), domain)
+    found = power_diagram(sites, weights, domain)
+    assert found.area[heavy] == pytest.approx(even.area.sum()) and np.delete(found.area, heavy) == pytest.approx(0)
+    assert found.moment[heavy] == pytest.approx(even.moment.sum(axis=0), abs=1e-12)
+    assert found.second[heavy] == pytest.approx(even.second.sum())
