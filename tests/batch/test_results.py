@@ -83,6 +83,18 @@ def test_a_summary_has_percentiles_growth_and_causes(package):
     assert "seconds grow as bytes ^ 1.50" in summary.text() and "3 x FILE" in summary.text()
 
 
+def test_figures_of_a_summary_stand_below_their_percentiles(package):
+    """However long their names are."""
+    rows = [row(f"{k}.obj", size=1000 * 2**k, seconds=0.1 * 2**k, report="") for k in range(3)]
+    summary = package("batch.statistics").summary_of(rows)
+    head, *lines = summary.text().splitlines()[2:]
+    assert len(lines) == len(summary.figures) and len({len(line) for line in (head, *lines)}) == 1
+    assert head.split() == ["0", "%", "25", "%", "50", "%", "75", "%", "95", "%", "99", "%", "100", "%"]
+    width = max(map(len, summary.figures))
+    assert [line[:width].rstrip() for line in lines] == list(summary.figures)
+    assert all(len(line[width:].split()) == 7 for line in lines)
+
+
 @pytest.mark.parametrize("power", [0.8, 1.0, 2.0])
 def test_what_every_run_takes_does_not_hide_how_seconds_grow(package, power):
     """Small files cost what starting costs; the order of the rows means nothing."""
