@@ -28,16 +28,14 @@ def read_layers(options: argparse.Namespace, plain: bool = False) -> tuple[list,
 
     plain : the object may be a `PlainObj`, of which nothing but UVs is asked
     """
-    if plain and options.input.suffix.lower() == ".obj":
-        with without_collections("numpy"):
-            check_paths(options)
-            found = read_plain_file(options)
-        if found is not None:
-            return [found[0]], [found[1]]
+    with without_collections("numpy"):
+        check_paths(options)
+        found = read_plain_file(options) if plain else None
+    if found is not None:
+        return [found[0]], [found[1]]
     require_blender()
     from ..blender.mesh import check_target
 
-    check_paths(options)
     pairs = read_file(options, options.uv_layer)
     for obj, _ in pairs:
         check_target(obj, options.uv_layer)

@@ -23,7 +23,7 @@ def read_plain_file(options: argparse.Namespace) -> tuple[PlainObj, Reading] | N
 
     None where the file, or what is asked for, leaves something to Blender.
     """
-    if options.output.suffix.lower() != ".obj" or options.subdivision != "auto":
+    if {path.suffix.lower() for path in (options.input, options.output)} != {".obj"} or options.subdivision != "auto":
         return None
     if any(getattr(options, name) for name in OF_SCENES):
         return None

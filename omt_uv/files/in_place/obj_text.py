@@ -67,7 +67,7 @@ def read(data: bytes) -> ObjText:
     start, corner_vertex, corner_uv = _corners(lines, faces)
     return ObjText(
         lines=lines,
-        positions=_numbers(vertices, 3),
+        positions=numbers(vertices, 3),
         uv=_uvs([lines[i] for i in uv_line]),
         uv_line=np.array(uv_line, np.int64),
         face_line=where[:, 0],
@@ -104,7 +104,7 @@ def _logical_lines(data: bytes) -> list[bytes]:
     return joined
 
 
-def _numbers(lines: Sequence[bytes], columns: int) -> np.ndarray:
+def numbers(lines: Sequence[bytes], columns: int) -> np.ndarray:
     """The first numbers (k, columns) of lines."""
     try:
         rows = [[float(word) for word in words(line)[1 : 1 + columns]] for line in lines]
@@ -116,7 +116,7 @@ def _numbers(lines: Sequence[bytes], columns: int) -> np.ndarray:
 def _uvs(lines: Sequence[bytes]) -> np.ndarray:
     """UVs (k,2) of lines; what is missing, or no finite number, is 0."""
     try:
-        found = _numbers(lines, 2)
+        found = numbers(lines, 2)
     except InPlaceError:
         found = np.array([[_float(word) for word in (words(line)[1:3] + [b"", b""])[:2]] for line in lines], float)
     return np.where(np.isfinite(found), found, 0.0)

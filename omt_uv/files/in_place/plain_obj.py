@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .imported import Imported, InPlaceError
-from .obj_text import ObjText, read
+from .obj_text import ObjText, numbers, read
 
 # Files of more bytes take longer than Blender's start.
 MOST_BYTES = 1 << 22
@@ -70,7 +70,7 @@ class PlainObj:
 def read_plain(path: Path) -> PlainObj | None:
     """The mesh of an OBJ file, None where Blender may make something else of the file than what stands in it."""
     try:
-        if path.suffix.lower() != ".obj" or not NAME.fullmatch(path.stem) or path.stat().st_size > MOST_BYTES:
+        if not NAME.fullmatch(path.stem) or path.stat().st_size > MOST_BYTES:
             return None
         data = path.read_bytes()
         if not all(map(LINE.fullmatch, data.split(b"\n"))):
@@ -120,7 +120,7 @@ def _is_near(positions: np.ndarray) -> bool:
 def _sharp_edges(text: ObjText, named: np.ndarray) -> np.ndarray | None:
     """Vertex pairs (k,2) of edges with other normals on either side at one of their ends; None where Blender may find
     others. named : the normal (c,) of every corner"""
-    normals = np.array([line.split()[1:4] for line in text.lines if line.startswith(b"vn")]).astype(float)
+    normals = numbers([line for line in text.lines if line.startswith(b"vn")], 3)
     if named.min() < 0 or named.max() >= len(normals):
         return None
     length = np.linalg.norm(normals[named], axis=1)

@@ -80,7 +80,7 @@ def test_uvs_that_lack_numbers_are_zero_there():
     assert obj_text._uvs(lines).tolist() == [[0.5, 0.25], [0.5, 0], [0, 2], [0, 0], [0, 0]]
     assert obj_text._uvs(lines[:1]).tolist() == [[0.5, 0.25]]
     with pytest.raises(InPlaceError, match="lacks a number"):
-        obj_text._numbers([b"v 1 2\n"], 3)
+        obj_text.numbers([b"v 1 2\n"], 3)
 
 
 @pytest.mark.parametrize(
