@@ -14,10 +14,14 @@ SIMILAR = "object.omt_similar"
 
 def _draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row = layout.row(align=True)
+    settings = settings_of(context, MATCH)
     for operator, text in zip(LANDMARKS, ("Landmarks", "Suggest", "Clear"), strict=True):
         if class_of(operator) is not None:
-            row.operator(operator, text=text)
-    draw_settings(layout.column(), MATCH, settings_of(context, MATCH))
+            button = row.operator(operator, text=text)
+            # Without a prefix, which stands for no landmarks, the button sets those of the last time.
+            if settings.landmark_prefix:
+                button.prefix = settings.landmark_prefix
+    draw_settings(layout.column(), MATCH, settings)
     big_button(layout, MATCH, "MOD_DATA_TRANSFER")
     if class_of(STRAIN) is not None:
         layout.operator(STRAIN, icon="MOD_SIMPLEDEFORM")

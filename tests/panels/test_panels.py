@@ -465,3 +465,58 @@ def test_the_choices_are_those_of_the_solver_and_of_the_command(package):
     operator = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").bl_rna.properties
     assert [item.identifier for item in operator["boundary"].enum_items] == [i for i, *_ in settings.BOUNDARIES]
     assert [item.identifier for item in operator["quality"].enum_items] == [i for i, *_ in settings.QUALITIES]
+
+
+class Handing(Layout):
+    """Keeps what is drawn of whose settings, and what every button is given."""
+
+    def __init__(self, shown, buttons):
+        super().__init__([])
+        self.shown, self.buttons = shown, buttons
+
+    def column(self, **_):
+        return Handing(self.shown, self.buttons)
+
+    row = split = box = column
+
+    def prop(self, data, name, **_):
+        self.shown.append((data, name))
+
+    def operator(self, name, **_):
+        self.buttons.append((name, given := types.SimpleNamespace()))
+        return given
+
+
+def test_a_button_beside_settings_is_given_those_that_it_has_as_well(package):
+    """Its own are remembered by Blender; of what belongs to another button it would know nothing."""
+
+    def same(one, other):
+        return (one.name, one.description) == (other.name, other.description)
+
+    scenes.bump()
+    handed = set()
+    for section in package("panels.sidebar").SECTIONS:
+        shown, buttons = [], []
+        section.draw(Handing(shown, buttons), bpy.context)
+        for name, given in buttons:
+            own = bpy.context.window_manager.operator_properties_last(name)
+            if any(data.bl_rna.identifier == own.bl_rna.identifier for data, _ in shown):
+                continue
+            for data, prop in shown:
+                if prop in settings_of(name) and same(own.bl_rna.properties[prop], data.bl_rna.properties[prop]):
+                    handed.add((name, prop))
+                    assert getattr(given, prop, None) == getattr(data, prop), (section.name, name, prop)
+    assert {("uv.omt_density_get", "unit"), ("uv.omt_density_get", "texture_size")} <= handed
+
+
+def test_landmarks_are_set_where_the_match_beside_looks_for_them(package):
+    scenes.bump()
+    properties = package("panels.section").settings_of(bpy.context, "object.omt_match")
+    try:
+        for properties.landmark_prefix in ("Landmark", "Joint", ""):
+            buttons = []
+            package("panels.match").SECTION.draw(Handing([], buttons), bpy.context)
+            given = [getattr(given, "prefix", None) for name, given in buttons if "landmarks" in name]
+            assert given == [properties.landmark_prefix or None] * 3
+    finally:
+        properties.property_unset("landmark_prefix")
