@@ -11,6 +11,7 @@ import pytest
 from readings import reading
 
 from omt_uv.pipelines import refine
+from omt_uv.pipelines.arranging.actions import symmetrize_islands
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.magnify import Magnified, Region, magnify
 from omt_uv.pipelines.refine import refine_islands
@@ -441,3 +442,19 @@ def test_factors_are_read_from_what_stands_behind_the_last_sign():
     ):
         with pytest.raises(ValueError, match=words):
             region_factors(texts)
+
+
+@pytest.mark.parametrize("stacked", [False, True])
+@pytest.mark.parametrize("gap", [0.05, 2.0])
+def test_halves_that_come_to_lie_in_one_another_are_said_unless_that_was_asked_for(stacked, gap):
+    V, F = meshes.grid(4, 3)
+    V = V * [1, 0.7, 1] + [0.5, 0, 0]
+    V[:, 2] = np.sin(2 * V[:, 0] + V[:, 1])
+    n = len(V)
+    small = V[:, :2] * 0.05
+    both = reading(np.concatenate([V * [-1, 1, 1], V]), np.concatenate([F[:, ::-1], F + n]),
+                   np.concatenate([small - small.max(axis=0) + [0.5 - gap, 0.4], V[:, :2]]))  # fmt: skip
+    found = symmetrize_islands([both], 0, stacked)
+    assert found.changed == 2
+    said = [text for _, text in found.warnings if "grew into each other" in text]
+    assert len(said) == (not stacked and gap < 1)

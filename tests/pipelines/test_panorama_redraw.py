@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from omt_uv.pipelines.panorama_redraw import redraw
+from omt_uv.pipelines.panorama_redraw import _pixels, redraw
 from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, SINUSOIDAL, to_sphere
 from omt_uv.solver.progress import drain
 
@@ -63,3 +63,22 @@ def test_a_flat_picture_is_nowhere_pinched():
     assert result[:, 255:257].mean(axis=1) == pytest.approx(0.5, abs=1e-3)
     with pytest.raises(ValueError, match="projection"):
         drain(redraw(ramp, EQUIRECT, SINUSOIDAL))
+
+
+@pytest.mark.parametrize("size", [(4, 4), (6, 6), (7, 7)])
+def test_beyond_a_side_of_the_octahedral_square_it_goes_on_where_that_side_is_glued_to(size):
+    """Every side is glued to itself about its midpoint: what is as far inside at the image of a point in it follows."""
+    rows, columns = size
+    along = np.linspace(0, 1, 9)
+    for side in (np.zeros(9), np.ones(9)):
+        for uv in (np.column_stack([along, side]), np.column_stack([side, along])):
+            np.testing.assert_allclose(to_sphere(uv, OCTAHEDRAL), to_sphere(uv, OCTAHEDRAL)[::-1], atol=1e-9)
+    image = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), axis=-1)
+    inner = np.arange(columns)
+    for i, j in ((-1, inner), (rows, inner), (inner, -1), (inner, columns)):
+        i, j = np.broadcast_arrays(i, j)
+        at = np.stack([i, j], axis=-1)
+        # The midpoint of the side, in pixels whose centres are whole numbers.
+        middle = np.where(at < 0, -0.5, np.where(at >= size, np.array(size) - 0.5, (np.array(size) - 1) / 2))
+        found = _pixels(image, OCTAHEDRAL, i, j)
+        np.testing.assert_array_equal(found, 2 * middle - at)
