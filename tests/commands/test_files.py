@@ -262,3 +262,19 @@ def test_as_a_blender_command(package, tmp_path):
     assert execute(["unwrap", str(tmp_path / "in.obj"), "-o", str(tmp_path / "out.obj"), "--quality", "draft"]) == 0
     assert (tmp_path / "out.obj").exists()
     assert execute(["measure", os.devnull]) == 1
+
+
+def test_a_body_is_one_and_the_same_in_either_kind_of_gltf(run, tmp_path):
+    """Both split vertices where normals or UVs have several values, and both are put together again."""
+    for suffix in (".glb", ".gltf"):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        bpy.ops.mesh.primitive_cube_add()
+        kind = {".glb": "GLB", ".gltf": "GLTF_SEPARATE"}[suffix]
+        scenes.export_gltf(tmp_path / f"in{suffix}", export_format=kind)
+        status, _, err = run("unwrap", tmp_path / f"in{suffix}", "-o", tmp_path / f"out{suffix}.obj",
+                             "--quality", "draft", "--report", tmp_path / f"{suffix}.json")  # fmt: skip
+        assert status == 0, err
+    one, other = (json.loads((tmp_path / f"{suffix}.json").read_text()) for suffix in (".glb", ".gltf"))
+    kept = [[{k: v for k, v in chart.items() if k not in ("seconds", "object")} for chart in report["charts"]]
+            for report in (one, other)]  # fmt: skip
+    assert kept[0] == kept[1] and [chart["faces"] for chart in kept[0]] == [12]

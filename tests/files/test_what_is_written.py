@@ -107,7 +107,7 @@ def test_layers_and_marks_that_a_format_does_not_hold_are_named(package, tmp_pat
     assert not any(f"{kind} (" in line for kind in there for line in bare)
 
 
-@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb", ".fbx"])
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_objects_that_a_format_does_not_hold_are_named(package, tmp_path, suffix):
     """Whatever is no mesh: curves and all else were left out of .obj and .ply without a word."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -126,6 +126,7 @@ def test_objects_that_a_format_does_not_hold_are_named(package, tmp_path, suffix
     line.points[1].co = (1, 0, 0, 1)
     made["FONT"].body = "A"
     made["META"].elements.new()
+    made |= {kind: bpy.data.lights.new(kind, kind) for kind in ("AREA", "POINT", "SPOT", "SUN")}
     for name, data in made.items():
         bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, data))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
@@ -136,13 +137,19 @@ def test_objects_that_a_format_does_not_hold_are_named(package, tmp_path, suffix
     assert ("metaballs (1)" in told) == ("META" not in shapes)
     for word in ("lattices (1)", "speakers (1)", "volumes (1)"):
         assert word in told
+    lights = {obj.data.type for obj in bpy.data.objects if obj.type == "LIGHT"}
+    assert ("lights (4)" in told) == (not lights)
+    # An FBX file holds them, though Blender reads them as points.
+    assert ("area lights (1)" in told) == (bool(lights) and "AREA" not in lights and suffix != ".fbx")
 
 
 @pytest.mark.parametrize("which", ["first", "second", "both"])
-@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb"])
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".gltf"])
 def test_colours_of_any_object_go_along(package, tmp_path, suffix, which):
     objects = [patch("First"), patch("Second")]
     for name, obj in zip(("first", "second"), objects, strict=True):
+        # It shows no colours, which is no reason to leave them out.
+        obj.data.materials.append(bpy.data.materials.new("Plain"))
         if which in (name, "both"):
             colour = obj.data.color_attributes.new("Colour", "BYTE_COLOR", "POINT")
             colour.data.foreach_set("color", np.tile([1.0, 0.0, 0.0, 1.0], len(obj.data.vertices)))
@@ -150,13 +157,13 @@ def test_colours_of_any_object_go_along(package, tmp_path, suffix, which):
             obj.data.color_attributes.render_color_index = 0
     path = written(package, tmp_path, suffix, *objects)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    {".obj": bpy.ops.wm.obj_import, ".ply": bpy.ops.wm.ply_import, ".glb": bpy.ops.import_scene.gltf}[suffix](
-        filepath=str(path)
-    )
+    readers = {".obj": bpy.ops.wm.obj_import, ".ply": bpy.ops.wm.ply_import}
+    readers.get(suffix, bpy.ops.import_scene.gltf)(filepath=str(path))
     colours = [np.array([d.color[:] for d in mesh.color_attributes[0].data]) for mesh in bpy.data.meshes
                if mesh.color_attributes]  # fmt: skip
     red = sum(int(((c[:, 0] > 0.9) & (c[:, 1] < 0.1)).sum() > 0) for c in colours)
-    assert red >= 1
+    # A PLY file is one mesh.
+    assert red == (2 if which == "both" and suffix != ".ply" else 1)
 
 
 @pytest.mark.parametrize("has", [(1, 0, 1), (0, 1, 0), (1, 0, 0), (0, 0, 1), (1, 1, 1)])
@@ -280,3 +287,29 @@ def test_several_ply_files_are_written_one_after_the_other(package, tmp_path):
         assert [x.name for x in bpy.context.view_layer.objects] == ["Patch"]
         assert (set(bpy.data.objects), set(bpy.data.meshes)) == before
     assert len({(tmp_path / f"{k}.ply").read_bytes() for k in range(3)}) == 1
+
+
+@pytest.mark.parametrize("floats", [False, True])
+@pytest.mark.parametrize("suffix", [".png", ".exr", ".hdr", ".tif", ".jpg", ".tga", ".bmp"])
+def test_nothing_of_a_picture_that_was_saved_stays_in_the_session(package, tmp_path, suffix, floats, monkeypatch):
+    images = package("files.images")
+    like = bpy.data.images.new("like", 6, 4, alpha=True, float_buffer=floats)
+    pixels = np.random.default_rng(3).uniform(0.1, 0.9, (4, 6, 4)).astype(np.float32)
+
+    def blocks():
+        every = (getattr(bpy.data, name) for name in dir(bpy.data))
+        return {block.name_full for them in every if isinstance(them, bpy.types.bpy_prop_collection) for block in them}
+
+    def full(path, size):
+        raise RuntimeError("nothing was written. Is the disk full?")
+
+    before, scene = blocks(), bpy.context.scene
+    images.save(tmp_path / f"made{suffix}", pixels, like)
+    assert blocks() == before
+    monkeypatch.setattr(images, "check_whole", full)
+    with pytest.raises(images.ImageError, match="Is the disk full"):
+        images.save(tmp_path / f"again{suffix}", pixels, like)
+    monkeypatch.undo()
+    assert blocks() == before and bpy.context.scene == scene
+    again = images.pixels_of(images.load(tmp_path / f"made{suffix}"))
+    assert again.shape == (4, 6, 4)

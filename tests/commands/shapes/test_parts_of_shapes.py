@@ -229,3 +229,21 @@ def test_a_batch_becomes_a_table_of_its_name(run, package, tmp_path):
     assert (tmp_path / "t.CSV").read_text() == run("table", tmp_path / "out")[1]
     status, _, err = run("table", tmp_path / "out", "-o", tmp_path / "t.txt")
     assert status == 1 and "t.txt: a table is .csv or .parquet" in err
+
+
+@pytest.mark.parametrize("command", ["batch", "library", "average"])
+def test_files_of_a_folder_are_known_by_their_suffix_in_any_case(package, tmp_path, command):
+    """Windows and scanners write .OBJ."""
+    plan = package("batch.plan")
+    for suffix in plan.READABLE:
+        for name in (f"lower{suffix}", f"upper{suffix.upper()}", f"none{suffix}.txt"):
+            (tmp_path / name).write_text("")
+    expected = sorted(path.name for path in tmp_path.iterdir() if path.suffix != ".txt")
+    if command == "batch":
+        found = [path for _, path in plan._of_folder(tmp_path, tmp_path / "out")]
+    elif command == "library":
+        found = package("commands.shapes.library")._meshes_below(tmp_path)
+    else:
+        options = SimpleNamespace(input=tmp_path, output=tmp_path.parent / "mean.blend", report=None)
+        found = package("commands.shapes.average")._shape_files(options)
+    assert sorted(path.name for path in found) == expected
