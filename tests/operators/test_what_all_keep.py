@@ -35,6 +35,39 @@ def run(name):
     return getattr(getattr(bpy.ops, module), operator)
 
 
+def session():
+    """What is of the scene and not of a mesh: modes, what is selected and active, tools, frame, and all data-blocks."""
+    context, scene = bpy.context, bpy.context.scene
+    every = (getattr(bpy.data, name) for name in dir(bpy.data))
+    blocks = {block.name_full for them in every if isinstance(them, bpy.types.bpy_prop_collection) for block in them}
+    tools = scene.tool_settings
+    return {
+        "scene": scene.name,
+        "mode": context.mode,
+        "active": context.view_layer.objects.active.name,
+        "selected": sorted(obj.name for obj in context.selected_objects),
+        "hidden": sorted(obj.name for obj in bpy.data.objects if obj.hide_viewport or obj.hide_get()),
+        "select mode": tuple(tools.mesh_select_mode),
+        "sync": tools.use_uv_select_sync,
+        "frame": scene.frame_current,
+        "cursor": tuple(scene.cursor.location),
+        "transform": scene.view_settings.view_transform,
+        "blocks": blocks,
+    }
+
+
+# How the names of data-blocks begin that an operator leaves; what it writes with, Blender's own font, may stay.
+MAKES = {"uv.omt_histogram": ("OMT UV", "Bfont"), "uv.omt_layout_image": ("OMT UV",), "object.omt_remesh": ("",)}
+
+
+def check_session(name, before, after):
+    """Modes, tools and the selection stay, and no image, material or scene is left behind by a detour."""
+    new = after["blocks"] - before["blocks"]
+    assert before["blocks"] <= after["blocks"] and all(block.startswith(MAKES.get(name, ())) for block in new), new
+    if name != "object.omt_remesh":
+        assert {k for k in before if k != "blocks" and before[k] != after[k]} == set()
+
+
 def changed(before, after):
     return {key for key in before.keys() | after.keys() if before.get(key) != after.get(key)}
 
@@ -53,8 +86,12 @@ def test_several_objects_change_where_they_shall_and_nowhere_else_and_undo_is_ex
     arguments, may = RUNS[name]
     before = {obj.name: state(obj) for obj in found}
     everything = len(bpy.data.objects)
+    bpy.context.scene.tool_settings.mesh_select_mode = (False, True, False)
+    bpy.context.scene.frame_set(7)
     bpy.ops.ed.undo_push()
+    there = session()
     assert run(name)("EXEC_DEFAULT", True, **arguments) == {"FINISHED"}
+    check_session(name, there, session())
     for obj in found:
         more = {"names"} if "groups" in may else set()
         # A colour attribute that is new becomes a layer of its own name.

@@ -101,3 +101,24 @@ def test_polygons_of_several_readings_keep_their_numbers(package):
     found = package("pipelines.distortion").worst_faces(readings, "AREA", 1.0)
     assert [f.tolist() for f in found] == [list(range(12))] * 2
     assert all(f.dtype.kind == "i" for f in map(np.asarray, found))
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("before", ["vertex", "edge", "face"])
+def test_faces_are_what_edit_mode_shows_and_nothing_else_is_selected(mode, before):
+    """Faces that were selected as vertices would have all between them selected, too."""
+    obj = scenes.bump(8, 6, height=0.0)
+    uv = scenes.seen_from_above(obj)
+    # Around one face in their midst.
+    around = [11, 12, 13, 19, 21, 27, 28, 29]
+    for face in around:
+        uv[list(obj.data.polygons[face].loop_indices)] *= 3
+    scenes.set_uv(obj, uv)
+    tools = bpy.context.scene.tool_settings
+    tools.mesh_select_mode = tuple(kind == before for kind in ("vertex", "edge", "face"))
+    if mode == "EDIT":
+        scenes.edit(obj, faces=[0])
+        tools.mesh_select_mode = tuple(kind == before for kind in ("vertex", "edge", "face"))
+    assert bpy.ops.uv.omt_worst(figure="AREA", share=100 * 8.5 / 48) == {"FINISHED"}
+    assert bpy.context.mode == "EDIT_MESH" and tuple(tools.mesh_select_mode) == (False, False, True)
+    assert selected(obj) == set(around)
