@@ -145,6 +145,15 @@ def test_a_border_is_very_soft_where_four_times_the_contrast_of_a_hard_one_is_ne
     assert any("very soft" in text for text in found.warnings) == soft
 
 
+@pytest.mark.parametrize("factor", [1.6, 1 / 1.6])
+def test_how_much_densities_vary_is_said_alike_of_what_grows_and_of_what_shrinks(factor):
+    region, area = np.r_[np.linspace(0, 0.72, 50), 1.0], np.r_[np.ones(50), 1e-3]
+    found = region_density.exact_density(region, area, factor)
+    (text,) = found.warnings
+    spread = found.density.max() / found.density.min()
+    assert float(text.rsplit(" ", 1)[1]) == pytest.approx(spread, rel=5e-3) and spread > 1
+
+
 @pytest.mark.parametrize(
     ("spread", "score"), [(2.0, 10 * 2**0.3), (1.0, 10.0), (0.5, 10 * 0.5**0.3), (0.2, 10 * 0.5**0.3)]
 )

@@ -6,7 +6,8 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.arranging.congruence import TOLERANCE, mirrored_match
+from omt_uv.solver.arranging.congruence import TOLERANCE, matching, mirrored_match
+from omt_uv.solver.arranging.stacks import stacks
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e5])
@@ -34,3 +35,19 @@ def test_the_image_in_a_plane_is_found_with_the_vertex_of_each(unit, seed):
         and mirrored_match(V, F, other, F[1:], normal, at) is None
     )
     assert mirrored_match(V[:0], F[:0], V[:0], F[:0], normal, at) is None
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_shapes_are_told_apart_alike_in_every_unit(unit, mirror):
+    """A vertex may be off by a share of the extent, and by no more, however long a metre is."""
+    V, F = meshes.bumpy(6, 5)
+    extent, rng = np.ptp(V, axis=0).max(), np.random.default_rng(1)
+    turned = V @ np.linalg.qr(rng.normal(size=(3, 3)))[0] * [1, 1, mirror] + [5, -3, 1]
+    for share, found in ((0.0, True), (0.3, True), (30.0, False)):
+        off = np.zeros_like(V)
+        off[3, 2] = share * TOLERANCE * extent
+        other = unit * (turned + off)
+        assert (matching(unit * V, F, other, F) is not None) == found
+        islands = [(unit * V, F, V[:, :2]), (other, F, V[:, :2] + 3)]
+        assert stacks(islands).moved == int(found)

@@ -33,6 +33,22 @@ def test_classes_of_corners_are_vertices(mesh, vertices):
         corner_classes(gluing)[0] = 1
 
 
+@pytest.mark.parametrize("polygon", [[0, 1, 2, 3, 4], [0, 1, 0, 2], [0, 0, 1, 2], [0, 1, 1, 0, 2], [0, 1, 2, 0, 1]])
+@pytest.mark.parametrize("turn", range(5))
+def test_a_polygon_alone_has_a_class_for_each_corner_and_looks_one_way(polygon, turn):
+    """However often it uses a vertex, and wherever it is cut: of a diagonal between corners on one vertex the vertices
+    do not tell which way it runs."""
+    polygon = np.array(polygon)
+    size = len(polygon)
+    corner = (np.arange(size) + turn) % size
+    triangles = np.column_stack([np.full(size - 2, corner[0]), corner[1:-1], corner[2:]])
+    gluing = polygon_gluing(triangles, np.zeros(size - 2, int), polygon, np.array([0, size]))
+    assert len(gluing.first) == size - 3 and not gluing.parallel().any()
+    assert len(np.unique(corner_classes(gluing))) == size
+    parts, turned = orientations(gluing, np.ones(size - 2))
+    assert len(np.unique(turned)) == 1
+
+
 def test_seams_are_not_glued():
     V, F = meshes.grid(2, 1)
     # The middle column of edges cuts the grid in two, and doubles its vertices.

@@ -15,9 +15,9 @@ from omt_uv.solver.analysis.symmetry_plane import MirrorImages
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.mesh.topology import twins
+from omt_uv.solver.mesh.topology import boundary_loops, twins
 from omt_uv.solver.seams import fine_paths, growth, limbs, parting, path_graph, predicted_scale
-from omt_uv.solver.seams.coarse_surface import coarsening
+from omt_uv.solver.seams.coarse_surface import CoarseSurface, coarsening
 from omt_uv.solver.seams.parting import PolygonGraph
 
 UP = (0.0, 0.0, 1.0)
@@ -441,3 +441,28 @@ def test_what_covers_is_parted_by_what_is_covered_nowhere():
     uv = np.column_stack([radius * np.cos(turn), radius * np.sin(turn)])
     ((one, other),) = parting._covering(chart, uv, PolygonGraph.of(chart))
     assert sorted([one.tolist(), other.tolist()]) == [[0], [2]]
+
+
+def test_a_step_of_one_half_costs_what_it_and_its_image_cost_without_a_mirror():
+    """Both are cut; what lies in the plane is cut once, and from one side to the other there is no step."""
+    V, F = meshes.grid(6, 5)
+    middle = V[:, 0].max() / 2
+    place = {tuple(p): k for k, p in enumerate(np.round(V, 6).tolist())}
+    image = np.array([place[tuple(p)] for p in np.round(V * [-1, 1, 1] + [2 * middle, 0, 0], 6).tolist()])
+    F = F[V[F].mean(axis=1)[:, 0] < middle]
+    F = np.concatenate([F, image[F][:, ::-1]])
+    V[:, 2] = np.cos(3 * (V[:, 0] - middle)) * V[:, 1] + 0.2 * V[:, 1] ** 2
+    boundary = np.zeros(len(V), bool)
+    boundary[np.concatenate(boundary_loops(F))] = True
+    surface = CoarseSurface(np.arange(len(V)), V, F, np.zeros(len(V)), np.full(len(V), 1 / len(V)), boundary, 2.0)
+    side = V[:, 0] <= middle + 1e-9
+    factor = 1 + surface.positions[:, 1]
+    whole = path_graph.path_graph(surface, factor, surface.boundary)
+    half = path_graph.path_graph(surface, factor, surface.boundary, path_graph.Mirrored(image, side))
+    cost = {frozenset(ends): c for ends, c in zip(whole.ends.tolist(), whole.cost, strict=True)}
+    in_plane = 0
+    for ends, found in zip(half.ends, half.cost, strict=True):
+        both = {frozenset(ends.tolist()), frozenset(image[ends].tolist())}
+        in_plane += len(both) == 1
+        assert side[ends].all() and found == pytest.approx(sum(cost[step] for step in both), rel=1e-6)
+    assert 4 <= in_plane < len(half.ends) / 2

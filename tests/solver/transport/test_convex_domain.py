@@ -69,3 +69,12 @@ def test_a_polygon_has_its_centroid_at_0_wherever_it_was():
     corners = np.array([[0, 0], [2, 0], [3, 1], [1, 3], [-1, 1.0]])
     a, b = ConvexPolygon(corners), ConvexPolygon(corners + [5, -3])
     np.testing.assert_allclose(a.corners, b.corners, atol=1e-12)
+
+
+def test_the_parameter_of_any_point_is_that_of_the_nearest_one_of_the_boundary(domain):
+    points = np.random.default_rng(2).normal(size=(60, 2)) * np.sqrt(domain.area)
+    found = domain.boundary_parameter(points)
+    assert ((found >= 0) & (found < domain.period)).all()
+    many = domain.boundary_point(np.linspace(0, domain.period, 4000, endpoint=False))
+    nearest = np.linalg.norm(points[:, None] - many, axis=2).min(axis=1)
+    assert (np.linalg.norm(points - domain.boundary_point(found), axis=1) <= nearest + 1e-12).all()

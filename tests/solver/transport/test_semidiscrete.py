@@ -187,6 +187,29 @@ def test_relabelling():
     np.testing.assert_allclose(b.cells.centroid, a.cells.centroid[order], atol=1e-7)
 
 
+@pytest.mark.parametrize("bad", ["twice", "outside", "nowhere", "no mass"])
+def test_what_is_bad_is_named_by_the_labels_that_it_was_given(bad):
+    """Solvers sort sites for their own ends; what they complain about is told in the order of the caller."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        sites, mass = inside(Disk(), 40, seed), np.ones(40)
+        which = int(rng.integers(40))
+        if bad == "twice":
+            sites, mass = np.vstack([sites, sites[which]]), np.ones(41)
+        elif bad == "outside":
+            # Beyond another site, so that all that is its cell lies outside, too.
+            far = np.linalg.norm(sites, axis=1).argmax()
+            sites[which] = 30 * sites[far]
+        elif bad == "nowhere":
+            sites[which] = np.nan
+        else:
+            mass[which] = 0
+        with pytest.raises(errors.TransportError) as caught:
+            drain(transport(sites, mass, Disk()))
+        assert len(caught.value.elements) == 1
+        assert caught.value.elements[0] in ((which, 40) if bad == "twice" else (which,))
+
+
 def test_bad_input_is_named():
     sites = inside(Disk(), 10)
     for mass in (np.r_[np.ones(9), 0], np.r_[np.ones(9), np.nan], np.r_[np.ones(9), -1]):
