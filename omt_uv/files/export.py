@@ -141,11 +141,17 @@ def _cut_uv_seams(mesh: bpy.types.Mesh) -> None:
         return
     bmesh.ops.split_edges(edit, edges=[edge for edge in edit.edges if _is_uv_seam(edge, layer)])
     for vertex in list(edit.verts):
-        # Faces that touch in this vertex alone, with UVs of their own.
-        corners = list(vertex.link_loops)
+        # Faces that touch in this vertex alone, with UVs of their own; those that have the same ones stay together.
+        corners, parted = list(vertex.link_loops), {}
         for loop in corners[1:]:
-            if loop[layer].uv != corners[0][layer].uv:
-                bmesh.utils.face_vert_separate(loop.face, vertex)
+            uv = tuple(loop[layer].uv)
+            if loop[layer].uv == corners[0][layer].uv:
+                continue
+            new = bmesh.utils.face_vert_separate(loop.face, vertex)
+            if uv in parted:
+                bmesh.utils.vert_splice(new, parted[uv])
+            else:
+                parted[uv] = new
     edit.to_mesh(mesh)
     edit.free()
     corner_vertex, uv = np.zeros(len(mesh.loops), np.int32), np.zeros(2 * len(mesh.loops), np.float32)

@@ -313,3 +313,29 @@ def test_nothing_of_a_picture_that_was_saved_stays_in_the_session(package, tmp_p
     assert blocks() == before and bpy.context.scene == scene
     again = images.pixels_of(images.load(tmp_path / f"made{suffix}"))
     assert again.shape == (4, 6, 4)
+
+
+@pytest.mark.parametrize("before", ["nothing", "attributes of these names"])
+def test_corners_of_a_ply_keep_their_uvs_where_faces_touch_at_a_vertex_alone(package, tmp_path, before):
+    """There is no edge to cut along, and a vertex of a PLY file has one UV; what was named s and t gives way."""
+    points = [[0, 0, 0], [1, 0, 0.2], [0.5, 1, 0], [-1, 0, 0.1], [-0.5, -1, 0], [1, -1, 0.3]]
+    faces = [[0, 1, 2], [0, 3, 4], [0, 4, 5]]
+    obj = scenes.add(points, faces, "Touching")
+    uv = np.random.default_rng(5).uniform(0, 1, (9, 2)).astype(np.float32)
+    # The last two share an edge, and go on across it.
+    uv[6], uv[7] = uv[3], uv[5]
+    scenes.set_uv(obj, uv)
+    if before != "nothing":
+        for name in "st":
+            obj.data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", np.full(6, 9.0, np.float32))
+    path = written(package, tmp_path, ".ply", obj)
+    data = path.read_bytes()
+    mesh, found = package("files.in_place.ply").read_uv(data)
+    assert len(mesh.positions) == 7 and len(mesh.face_start) - 1 == 3
+    place = {tuple(np.round(points[v], 4).tolist()): v for v in range(6)}
+    for k in range(3):
+        corners = slice(mesh.face_start[k], mesh.face_start[k + 1])
+        vertex = [place[tuple(np.round(p, 4).tolist())] for p in mesh.positions[mesh.corner_vertex[corners]]]
+        there = {v: tuple(x) for v, x in zip(vertex, np.asarray(found)[corners].tolist(), strict=True)}
+        here = {v: tuple(x) for v, x in zip(faces[k], uv[3 * k : 3 * k + 3].tolist(), strict=True)}
+        assert there == here
