@@ -191,8 +191,6 @@ class _Polygons:
 
     def _told_apart(self, other: np.ndarray, unsure: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """The images (p,) of polygons, of those `unsure` (p,) bool, two in one place, by what is around them."""
-        if not unsure.any():
-            return other
         corner, to = self._nearest_corners(other, normal, ~unsure)
         image = np.full(len(self.points), -1)
         image[self.vertex[corner]] = to

@@ -181,9 +181,6 @@ class _Collapses:
     place: np.ndarray
     sides: np.ndarray
 
-    def only(self, rows: np.ndarray) -> _Collapses:
-        return _Collapses(self.keep[rows], self.gone[rows], self.place[rows], self.sides[rows])
-
 
 def _leaves_edges(triangles: np.ndarray, twin: np.ndarray, h: np.ndarray, boundary: np.ndarray) -> np.ndarray:
     """Edges (k,) bool opposite to which no vertex has valence three, and that do not join two boundaries."""
