@@ -179,3 +179,10 @@ def test_landmarks_of_a_body_are_its_groups_of_that_name_that_have_vertices(pack
         obj.vertex_groups.new(name=name).add(vertices, 1.0, "REPLACE")
     found = module.read_volume_body(obj).landmarks
     assert {name: rows.tolist() for name, rows in found.items()} == {"LM_nose": [3], "LM_ears": [5, 9]}
+
+
+def test_an_object_that_is_nowhere_is_refused_by_its_transformation(package):
+    obj = scenes.bump()
+    obj.scale.x = np.nan
+    bpy.context.view_layer.update()
+    refused("NonFiniteError", "transformation of the object is not finite", package("blender.mesh").read, obj)

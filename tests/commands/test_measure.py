@@ -6,6 +6,7 @@ import json
 
 import bpy
 
+import numpy as np
 import pytest
 import scenes
 
@@ -76,3 +77,31 @@ def test_regions_that_are_not_there_and_files_of_other_kinds_are_one_line(run, t
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     found, out, err = run("measure", tmp_path / "in.blend", *words)
     assert (found, out) == (status, "") and said in err.splitlines()[-1]
+
+
+def test_all_that_is_measured_of_a_modifier_is_what_it_is_of_the_mesh_once_that_is_applied(run, tmp_path):
+    """Figures and pictures are of one surface."""
+    found = {}
+    for name in ("modifier", "applied", "cage"):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        obj = scenes.bump(5, 4, height=1.0)
+        uv = scenes.seen_from_above(obj, 0.2)
+        scenes.set_uv(obj, uv**1.3)
+        if name != "cage":
+            obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        if name == "applied":
+            bpy.context.view_layer.objects.active = obj
+            bpy.ops.object.modifier_apply(modifier="Subdivision")
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{name}.blend"))
+        status, out, err = run("measure", tmp_path / f"{name}.blend", "--histogram", tmp_path / f"{name}.png", "--json")
+        assert status == 0, err
+        image = bpy.data.images.load(str(tmp_path / f"{name}.png"))
+        found[name] = json.loads(out), np.array(image.pixels[:])
+    one, other, cage = (found[name][0] for name in ("modifier", "applied", "cage"))
+    assert one.pop("on_subdivided_surface") and "on_subdivided_surface" not in other
+    for key, value in other.items():
+        # Blender may put vertices onto the limit surface.
+        assert one[key] == pytest.approx(value, rel=0.05), key
+    assert cage["area_l1"] != pytest.approx(other["area_l1"], rel=1e-2)
+    drawn, applied, of_cage = (found[name][1] for name in ("modifier", "applied", "cage"))
+    assert np.abs(drawn - applied).mean() < 0.1 * np.abs(drawn - of_cage).mean()

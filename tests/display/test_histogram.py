@@ -112,3 +112,18 @@ def test_a_picture_that_is_not_there_after_it_was_saved_is_an_error_and_nothing_
     image.save = lambda: (tmp_path / "a.png").write_bytes(b"")
     canvas.save(tmp_path / "a.png", np.zeros((2, 2, 3)))
     assert images.removed == [image, image]
+
+
+@pytest.mark.parametrize("axis_of", [area_axis, shear_axis])
+def test_what_lies_beyond_an_axis_is_counted_in_its_last_bars(axis_of, monkeypatch):
+    monkeypatch.setattr(histograms, "write", lambda *_: None)
+    octaves = np.linspace(-3, 5, 40)
+    octaves[:9] = [-40, -30, -20, 20, 30, 40, 12, -12, 11]
+    share = np.full(40, 2.5)
+    axis = axis_of(octaves, share) if axis_of is area_axis else axis_of(2.0**octaves, share)
+    inside = np.clip(octaves, axis.low, axis.high)
+    assert (octaves > axis.high).any()
+    one, other = (np.ones((HEIGHT, WIDTH // 2, 3)) for _ in range(2))
+    histograms._plot(one, octaves, share, axis, "")
+    histograms._plot(other, inside, share, axis, "")
+    assert np.array_equal(one, other)

@@ -5,8 +5,11 @@ from __future__ import annotations
 import colorsys
 from types import SimpleNamespace
 
+import meshes
 import numpy as np
 import pytest
+from readings import reading
+from sphere_shapes import random_rotation
 
 from omt_uv.display import canvas, histogram, preview, raster
 from omt_uv.display.textures import layouts, patterns, world
@@ -367,3 +370,33 @@ def test_cells_of_a_checker_have_their_names_from_24_pixels_on(monkeypatch, cell
         assert int(x / cell) == j and int(y / cell) == i and x / cell % 1 == 0.5 and y / cell % 1 == pytest.approx(0.62)
         mine = picture[i * cell : (i + 1) * cell, j * cell : (j + 1) * cell]
         assert np.abs(mine - colour).max(axis=2).min() < 0.05
+
+
+@pytest.mark.parametrize("kind", ["area", "shear", "normals", "preview"])
+def test_an_object_that_is_turned_and_moved_looks_as_one_whose_vertices_are(kind):
+    V, F = meshes.bumpy(5, 4)
+    turn, shift = random_rotation(4), np.array([3.0, -2.0, 5.0])
+
+    def drawn(positions, rotation, moved):
+        placed = [preview.Placed(reading(positions, F, V[:, :2]), rotation, moved)]
+        return preview.preview(placed, 60) if kind == "preview" else layouts.layout_picture(placed, kind, 60)
+
+    there = drawn(V, turn, shift)
+    np.testing.assert_allclose(there, drawn(V @ turn.T + shift, np.eye(3), np.zeros(3)), atol=2e-2)
+    if kind in ("normals", "preview"):
+        assert np.abs(there - drawn(V, np.eye(3), shift)).max() > 0.1
+
+
+def test_text_stands_where_it_begins_also_with_spaces_before_it():
+    """Of a text at the left the place is that of its first letter, and not of the first ink."""
+
+    def ink(text, align):
+        picture = np.ones((60, 240, 3))
+        canvas.write(picture, text, 100, 40, 30, (0, 0, 0), align)
+        return np.flatnonzero((picture < 0.5).any(axis=(0, 2)))
+
+    plain, spaced = ink("H", "left"), ink("  H", "left")
+    assert plain[0] >= 100 and len(spaced) == len(plain) and spaced[0] > plain[0] + 5
+    wide = [ink("HHHH", align) for align in ("left", "middle", "right")]
+    assert [len(w) for w in wide] == [len(wide[0])] * 3 and wide[2][-1] < 100 <= wide[0][0]
+    assert abs((wide[1][0] + wide[1][-1]) / 2 - 100) <= 1

@@ -90,6 +90,14 @@ def test_leftovers_of_the_dead_go_and_files_of_the_living_stay(tmp_path):
     assert names(tmp_path) == ["b.txt"]
 
 
+def test_what_a_process_of_another_machine_left_goes_at_once_with_its_lock(tmp_path):
+    """Its number may be that of one that lives here: that nothing holds the lock tells, so the lock goes last."""
+    for suffix in (".lock", ".obj", ".mtl", ".aaa"):
+        (tmp_path / f".omt_uv_{os.getpid()}_x{suffix}").write_text("half")
+    verified.sweep(tmp_path)
+    assert names(tmp_path) == []
+
+
 def test_old_leftovers_without_a_lock_go(tmp_path):
     (tmp_path / ".omt_uv_old").mkdir()
     gone = subprocess.Popen([sys.executable, "-c", ""])

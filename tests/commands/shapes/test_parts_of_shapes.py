@@ -247,3 +247,18 @@ def test_files_of_a_folder_are_known_by_their_suffix_in_any_case(package, tmp_pa
         options = SimpleNamespace(input=tmp_path, output=tmp_path.parent / "mean.blend", report=None)
         found = package("commands.shapes.average")._shape_files(options)
     assert sorted(path.name for path in found) == expected
+
+
+@pytest.mark.parametrize(("markers", "good"), [("0,7", True), ("7,0", True), ("8,0", False), ("0,8", False)])
+def test_numbers_of_vertices_end_below_their_count(package, markers, good):
+    bpy.ops.mesh.primitive_cube_add()
+    obj = bpy.context.object
+    distance = package("commands.shapes.distance")
+    options = SimpleNamespace(markers=distance.pair_of_markers(markers))
+    pairs = [(obj, package("blender.mesh").read(obj))]
+    if good:
+        (found,) = distance._markers(options, "in.obj", pairs)
+        assert found is not None
+    else:
+        with pytest.raises(package("commands.common").CommandError, match="there is no vertex 8. It has 8, from 0"):
+            distance._markers(options, "in.obj", pairs)

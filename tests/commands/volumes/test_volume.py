@@ -25,6 +25,12 @@ def test_every_format_holds_the_map(run, body):
     assert status == 0, err
     data = np.load(body / "out.npz")
     assert data["positions"].shape == data["points"].shape and len(data["dilation"]) == len(data["tets"])
+    # Shares of the body, times what they grow by, are those of the ball, which lies about 0.
+    corner = data["points"][data["tets"]] - data["points"][data["tets"]][:, :1]
+    here = np.linalg.det(corner[:, 1:])
+    assert (here / here.sum() * 2.0 ** data["dilation"]).sum() == pytest.approx(1, rel=1e-9)
+    assert np.linalg.norm(data["positions"], axis=1).max() == pytest.approx(1, abs=1e-6)
+    np.testing.assert_allclose(np.ptp(data["points"], axis=0), np.ptp(limbed(2)[0], axis=0), rtol=1e-5)
     (figures,) = json.loads((body / "r.json").read_text())["volumes"]
     assert figures["inverted"] == 0 and figures["vertex_share_error"] < 0.02 and figures["object"] == "Body"
     assert run(*words, "-o", body / "out.vtu", "--domain", "cube")[0] == 0

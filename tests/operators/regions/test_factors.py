@@ -119,3 +119,9 @@ def test_the_chosen_row_goes_and_the_next_one_is_chosen(striped, chosen, gone, t
     bpy.ops.uv.omt_region_remove()
     assert [factor - 2.0 for _, factor in rows(striped)] == [k for k in range(3) if k != gone]
     assert striped.omt_uv_regions.active == then
+
+
+@pytest.mark.parametrize("operator", ["omt_region_add", "omt_region_remove"])
+def test_what_is_no_mesh_has_no_list(operator):
+    bpy.ops.object.empty_add()
+    assert "is no mesh. Select one." in scenes.error_of(getattr(bpy.ops.uv, operator))
