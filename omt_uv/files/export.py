@@ -142,16 +142,17 @@ def _cut_uv_seams(mesh: bpy.types.Mesh) -> None:
     bmesh.ops.split_edges(edit, edges=[edge for edge in edit.edges if _is_uv_seam(edge, layer)])
     for vertex in list(edit.verts):
         # Faces that touch in this vertex alone, with UVs of their own; those that have the same ones stay together.
-        corners, parted = list(vertex.link_loops), {}
+        corners = list(vertex.link_loops)
+        parted: dict[tuple[float, ...], bmesh.types.BMVert] = {}
         for loop in corners[1:]:
-            uv = tuple(loop[layer].uv)
-            if loop[layer].uv == corners[0][layer].uv:
+            place = tuple(loop[layer].uv)
+            if place == tuple(corners[0][layer].uv):
                 continue
             new = bmesh.utils.face_vert_separate(loop.face, vertex)
-            if uv in parted:
-                bmesh.utils.vert_splice(new, parted[uv])
+            if place in parted:
+                bmesh.utils.vert_splice(new, parted[place])
             else:
-                parted[uv] = new
+                parted[place] = new
     edit.to_mesh(mesh)
     edit.free()
     corner_vertex, uv = np.zeros(len(mesh.loops), np.int32), np.zeros(2 * len(mesh.loops), np.float32)

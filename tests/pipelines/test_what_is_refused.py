@@ -7,16 +7,21 @@ import numpy as np
 import pytest
 
 from omt_uv.pipelines.arranging.actions import rectify_islands
-from omt_uv.pipelines.layout import Refusal
+from omt_uv.pipelines.globe import GlobeJob, project
+from omt_uv.pipelines.layout import Refusal, UnwrapJob
 from omt_uv.pipelines.magnify import Region, islands_of
 from omt_uv.pipelines.reading import Reading
 from omt_uv.pipelines.regions.several import MISSED, JointShares, NamedRegion, magnify_several, region_factors
+from omt_uv.pipelines.remesh import RemeshJob, remesh_series
 from omt_uv.pipelines.shapes.landmark_pairs import PairsError, pairs_of, read_pairs
 from omt_uv.pipelines.shapes.match import largest_part
 from omt_uv.pipelines.shapes.partition import MOST_MATERIALS, partition_surface
 from omt_uv.pipelines.shapes.strain import strain_of
-from omt_uv.settings import MagnifySettings, PartitionSettings
+from omt_uv.pipelines.unwrap import lay_out
+from omt_uv.settings import GlobeSettings, MagnifySettings, PartitionSettings, RemeshSettings, Settings
 from omt_uv.solver import errors
+from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.errors import MeshError
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
 
@@ -120,3 +125,45 @@ def test_regions_that_missed_their_share_are_told_and_no_others(off):
     shares = JointShares(("a", "b", "c"), target / 2, target, target * (1 + off * MISSED * missed))
     (told,) = shares.warnings()
     assert told.startswith("b has ") and told.endswith(" of the texture instead of 30 %")
+
+
+def quad_bump():
+    """Quads, which are not numbered as their triangles are, of one disk."""
+    points, quads = meshes.quad_grid(5, 4)
+    points = np.column_stack([points[:, 0], points[:, 1], 0.3 * np.sin(4 * points[:, 0]) * points[:, 1]])
+    return points, [list(q) for q in quads]
+
+
+def remeshed(surface, density):
+    none = np.zeros((0, 2), np.int64)
+    settings = RemeshSettings(count=30, density="attribute", source="it")
+    return drain(remesh_series(RemeshJob(surface, none, none, density), settings))
+
+
+def unwrapped(surface, density):
+    return drain(lay_out([UnwrapJob(surface, target=Target(density))], Settings(quality="draft")))
+
+
+def projected(surface, density):
+    return drain(project([GlobeJob(surface, density=density)], GlobeSettings(quality="draft")))
+
+
+@pytest.mark.parametrize("pipeline", [remeshed, unwrapped, projected])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, 1e-9])
+@pytest.mark.parametrize("bad", [[3], [1, 5], [4]])
+def test_a_density_that_is_none_is_that_of_polygons_by_their_numbers(pipeline, value, bad):
+    """However they are cut into triangles; what varies too much is so of the least ones."""
+    if pipeline is projected:
+        points, triangles = meshes.cube()
+        quads = np.column_stack([triangles[:6], triangles[6:, 2]])
+        surface = meshes.polygon_surface(points, [list(q) for q in quads])
+    else:
+        surface = meshes.polygon_surface(*quad_bump())
+    density = np.ones(len(surface.triangles))
+    density[np.isin(surface.triangle_face, bad)] = value
+    if value > 0 and pipeline is not remeshed:
+        pytest.skip("what varies much is said of the result")
+    with pytest.raises((MeshError, Refusal)) as caught:
+        pipeline(surface, density)
+    error = getattr(caught.value, "error", caught.value)
+    assert (error.kind, error.elements.tolist()) == ("face", bad)

@@ -34,6 +34,8 @@ def located(error: MeshError, chart: Chart) -> MeshError:
     if place is not None:
         elements = place[elements]
         elements = elements[(elements >= 0).reshape(len(elements), -1).all(axis=1)]
+        # A polygon has several triangles that something may be wrong with.
+        elements = np.unique(elements) if error.kind == "face" else elements
     return type(error)(error.cause, error.remedy, error.kind, elements)
 
 
