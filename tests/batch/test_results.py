@@ -109,6 +109,18 @@ def test_an_empty_batch_has_a_summary_and_a_page(package, tmp_path):
     assert "<!doctype html>" in package("batch.pages").page_of([], tmp_path, "none")
 
 
+@pytest.mark.parametrize("name", ["</script><b>", "<!--<script>", "a&lt;b&amp;c", "]]>", "\u2028 '\" \\"])
+def test_no_name_of_a_file_ends_or_begins_an_element_of_the_page_and_each_is_read_back(package, tmp_path, name):
+    pages, template = package("batch.pages"), package("batch.page_text").PAGE
+    text = pages.page_of([row(name, message=name, words=json.dumps([name]))], tmp_path, name)
+    begin, end = template.split("DATA_OF_THE_BATCH")
+    assert text.startswith(begin) and text.endswith(end)
+    data = text[len(begin) : -len(end)]
+    assert not set("<>&") & set(data)
+    table = json.loads(data)
+    assert table["title"] == name and table["words"] == [name] and table["rows"][0][0] == name
+
+
 # ---- the page, in a browser ---------------------------------------------------------------------------------
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

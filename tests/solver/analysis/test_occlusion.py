@@ -55,3 +55,17 @@ def test_vertices_have_the_mean_of_their_faces_and_loose_ones_nothing():
     hidden = vertex_occlusion(np.concatenate([V, [[9.0, 9.0, 9.0]]]), F)
     assert hidden[-1] == 0
     assert hidden[: len(V) // 2].max() < 0.05 < hidden[len(V) // 2 : -1].min()
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, 1.0])
+def test_what_is_the_same_on_all_faces_is_the_same_at_all_vertices(value):
+    """Whatever their areas; and a mean is between the least and the greatest around a vertex."""
+    V, F = meshes.bumpy(7, 5)
+    V = V * [1, 30, 1]
+    sides = np.full((2, len(F)), value)
+    assert vertex_occlusion(V, F, sides) == pytest.approx(np.full(len(V), value))
+    sides = np.random.default_rng(3).uniform(0, 1, len(F)) * np.ones((2, 1))
+    found = vertex_occlusion(V, F, sides)
+    for k in range(len(V)):
+        around = sides[0, (k == F).any(axis=1)]
+        assert around.min() - 1e-12 <= found[k] <= around.max() + 1e-12

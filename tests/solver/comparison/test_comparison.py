@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scripted_steps import done
 
+from omt_uv.solver.comparison import comparison_figures
 from omt_uv.solver.comparison.bumps import bumps_of, curvature_error
 from omt_uv.solver.comparison.comparison_figures import compare, distances_to
 from omt_uv.solver.comparison.triangle_shapes import compare_shapes, topology_of
@@ -119,3 +121,28 @@ def test_what_cannot_be_compared_is_refused_by_name():
     V[3] = np.nan
     with pytest.raises(NonFiniteError, match="3"):
         drain(compare((V, F), grid(2), 4000))
+
+
+@pytest.mark.parametrize("change", ["nothing", "a face turned over", "a half turned over", "all turned over", "a hole",
+                                    "a part more", "a fin"])  # fmt: skip
+def test_topology_is_kept_where_nothing_was_cut_joined_or_turned_over(change, monkeypatch):
+    # Curvature takes its time, and is not asked for here.
+    monkeypatch.setattr(comparison_figures, "bumps_of", lambda *_: done(None))
+    monkeypatch.setattr(comparison_figures, "_curvature_errors", lambda *_: (0.0, 0.0))
+    monkeypatch.setattr(comparison_figures, "POINTS", 400)
+    V, F = icosphere(0)
+    W, G = V.copy(), F.copy()
+    if change == "a face turned over":
+        G[7] = G[7, ::-1]
+    elif change == "a half turned over":
+        G[V[F].mean(axis=1)[:, 2] > 0] = G[V[F].mean(axis=1)[:, 2] > 0][:, ::-1]
+    elif change == "all turned over":
+        G = G[:, ::-1]
+    elif change == "a hole":
+        G = G[1:]
+    elif change == "a part more":
+        W, G = np.concatenate([V, V[:3] + 9]), np.concatenate([G, [[len(V), len(V) + 1, len(V) + 2]]])
+    elif change == "a fin":
+        W, G = np.concatenate([V, [[0, 0, 2.0]]]), np.concatenate([G, [[G[0, 0], G[0, 1], len(V)]]])
+    kept = drain(compare((V, F), (W, G), 400)).topology_kept
+    assert kept == (change in ("nothing", "all turned over"))

@@ -166,3 +166,30 @@ def test_no_cell_passes_through_a_single_vertex():
     assert not len(cut_along_cells(V, F, division).torn())
     with pytest.raises(errors.CountError, match="2 separate parts"):
         drain(divide(V, F, 1))
+
+
+# How fields of a division grow with the unit of length, as a power; sides and sites have no unit.
+GROWS = {
+    "site_weights": 2, "asked": 2, "residual": 0, "iterations": 0, "steps": 0, "unequal": 0, "cells.area": 2,
+    "cells.part": 2, "cells.pair": 0, "cells.side": 0, "cells.conductance": 0, "pairs.site": 0, "pairs.face": 0,
+    "pairs.squared": 2, "pairs.log": 1, "pairs.nearest": 2, "pairs.farthest": 2, "pairs.last": 0,
+}  # fmt: skip
+
+
+def test_a_division_is_told_in_the_units_of_the_mesh():
+    V, F = two_parts()
+    one, other = (drain(divide(unit * V, F, 7, options=DivisionOptions(relax=1))) for unit in (1.0, 8.0))
+    fields = {
+        f"{owner}.{name}": value for owner in ("cells", "pairs") for name, value in vars(getattr(one, owner)).items()
+    }
+    fields |= vars(one)
+    assert {k for k in fields if k not in ("sites", "cells", "pairs", "cells.polygons")} == set(GROWS)
+    for name, power in GROWS.items():
+        a, b = one, other
+        for part in name.split("."):
+            a, b = getattr(a, part), getattr(b, part)
+        np.testing.assert_allclose(b, np.asarray(a) * 8.0**power, rtol=1e-9, atol=1e-12, err_msg=name)
+    assert one.cells.area.sum() == pytest.approx(face_areas(V, F).sum())
+    # The least and the greatest of the squares of the three corners, at most.
+    assert (one.pairs.nearest <= one.pairs.squared.min(axis=1) + 1e-9).all()
+    assert (one.pairs.farthest >= one.pairs.squared.max(axis=1) - 1e-9).all()
