@@ -1,6 +1,7 @@
 """Solvers as generators: results, errors and fractions come through, also from a thread; a run has a log."""
 
 import threading
+import time
 
 import meshes
 import numpy as np
@@ -154,3 +155,17 @@ def test_a_solver_goes_on_all_the_way_and_is_at_its_end_when_it_says_so(name):
     assert at[0] < 0.1 and at.min() >= 0 and at.max() <= 1 and (np.diff(at) >= -1e-9).all()
     # At most one report comes at the end, and no stage is passed over in one step.
     assert (at >= 1).sum() <= 1 and np.diff(at, append=1.0).max() < 0.8
+
+
+def test_what_a_log_tells_of_a_stage_is_the_sum_of_what_its_clock_went_on(monkeypatch):
+    """Also where a stage ends in an error, or is in another one."""
+    clock = iter([10.0, 12.0, 20.0, 21.0, 24.0, 30.0, 100.0, 107.0])
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    log = RunLog()
+    with log.timed("one"):
+        pass
+    with log.timed("outer"), log.timed("one"):
+        pass
+    with pytest.raises(ValueError, match="no"), log.timed("other"):
+        raise ValueError("no")
+    assert log.seconds == {"one": 2.0 + 3.0, "outer": 10.0, "other": 7.0}
