@@ -32,6 +32,27 @@ def test_the_panel_says_how_exact_the_sphere_is(package):
     assert float(dict(rows)["Area error"].split()[0]) < 1
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_several_globes_the_worst_figures_are_told(package, order):
+    """Whichever object they are of."""
+    alone = []
+    for squash in ((1.0, 0.8, 1.3), (1.0, 0.3, 2.5)):
+        obj = ball(squash=squash)
+        project()
+        alone.append(dict(package("session.last_run").state.summary.rows))
+        bpy.data.objects.remove(obj)
+    names = ("A", "B")[::order]
+    made = [ball(name, squash, 9.0 * k) for k, (name, squash) in
+            enumerate(zip(names, ((1.0, 0.8, 1.3), (1.0, 0.3, 2.5)), strict=True))]  # fmt: skip
+    scenes.select(made[::order])
+    project()
+    rows = dict(package("session.last_run").state.summary.rows)
+    for figure in ("Area error", "Shear"):
+        values = [float(row[figure].split()[0]) for row in (*alone, rows)]
+        assert values[2] == pytest.approx(max(values[:2]), rel=0.05), figure
+    assert float(alone[1]["Shear"]) > 1.1 * float(alone[0]["Shear"])
+
+
 def test_the_equirectangular_layout_is_north_up_and_front_in_the_middle():
     obj = ball()
     project(projection="EQUIRECT")

@@ -40,6 +40,8 @@ def test_levels_stand_in_a_collection_and_are_shown_in_turn():
         (name,) = shown()
         seen.append(name)
         assert bpy.context.view_layer.objects.active.name == name
+        # What is worked on next is what is seen.
+        assert [obj.name for obj in bpy.context.view_layer.objects if obj.select_get()] == [name]
     assert seen == ["Bump_LOD1", "Bump_LOD2", "Bump", "Bump_LOD0"]
 
 
