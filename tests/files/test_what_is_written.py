@@ -339,3 +339,27 @@ def test_corners_of_a_ply_keep_their_uvs_where_faces_touch_at_a_vertex_alone(pac
         there = {v: tuple(x) for v, x in zip(vertex, np.asarray(found)[corners].tolist(), strict=True)}
         here = {v: tuple(x) for v, x in zip(faces[k], uv[3 * k : 3 * k + 3].tolist(), strict=True)}
         assert there == here
+
+
+@pytest.mark.parametrize("turn", [(90, 0, 0), (0, 90, 0), (0, 0, 90), (90, 90, 0), (30, -50, 110)])
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_an_object_stands_where_it_stood_however_it_is_turned(package, tmp_path, suffix, turn):
+    """Formats have axes of their own: what is turned for them is turned back."""
+    # All of its vertices are in use.
+    obj = patch("Patch", 6)
+    obj.rotation_euler = np.radians(turn)
+    obj.location = (1, 2, -3)
+    bpy.context.view_layer.update()
+
+    def places(one):
+        local = np.array([v.co[:] for v in one.data.vertices])
+        matrix = np.array(one.matrix_world)
+        return np.unique(np.round(local @ matrix[:3, :3].T + matrix[:3, 3], 4) + 0.0, axis=0)
+
+    before = places(obj)
+    path = written(package, tmp_path, suffix, obj)
+    (found,) = package("files.meshes").load(path)
+    after = places(found)
+    assert after.shape == before.shape or suffix == ".stl"
+    distance = np.linalg.norm(before[:, None] - after, axis=2)
+    assert max(distance.min(axis=0).max(), distance.min(axis=1).max()) < 3e-4

@@ -36,3 +36,28 @@ def test_a_job_that_is_stopped_waits_again(package, worked):
     job.end("DONE")
     job.close()
     assert (job.state, job.progress) == ("DONE", 1.0)
+
+
+def test_a_job_that_is_thrown_away_waits_again_and_one_that_has_ended_does_not(package):
+    """Its generator is closed, and what was reached of it is still drawn."""
+    closed = []
+
+    def steps():
+        try:
+            yield
+        finally:
+            closed.append(True)
+
+    queue = package("session.queue")
+    jobs = [queue.Job(name) for name in ("thrown", "done", "failed")]
+    everything = queue.Queue(jobs)
+    for job in jobs:
+        next(job.begin(steps()))
+        job.progress = 0.5
+        assert job.state == "RUNNING"
+    jobs[0].close()
+    jobs[1].end("DONE")
+    jobs[2].end("FAILED", "no")
+    assert [(j.state, j.progress, j.reason) for j in jobs] == [("WAITING", 0.5, ""), ("DONE", 1.0, ""),
+                                                              ("FAILED", 0.5, "no")]  # fmt: skip
+    assert len(closed) == 3 and everything.current is jobs[0]

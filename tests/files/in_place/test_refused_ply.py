@@ -91,6 +91,18 @@ WRONG_OFF = {
 }
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_comments_and_what_follows_in_a_line_of_an_off_say_nothing(tmp_path, end):
+    """Before, behind and between its lines; colours behind faces and vertices, too."""
+    plain, commented = tmp_path / "a.off", tmp_path / "b.off"
+    plain.write_text("OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 2 3\n")
+    lines = ["# made by hand 3 1", "OFF # 7 8 9", "", "# 9 9 9", "4 2 0 # counts", "0 0 0 # 1 0 0", "1 0 0 0.5 0.5 0.5",
+             "  # 5", "0 1 0", "0 0 1", "3 0 1 2 # 3", "#", "3 0 2 3 255 0 0 # red", "# end"]  # fmt: skip
+    commented.write_bytes(end.join(lines).encode())
+    one, other = read_off(plain), read_off(commented)
+    assert one[0].tolist() == other[0].tolist() and one[1] == other[1] == [(0, 1, 2), (0, 2, 3)]
+
+
 @pytest.mark.parametrize("old", WRONG_OFF)
 def test_an_off_that_is_none_is_refused_by_what_is_wrong(tmp_path, old):
     new, words = WRONG_OFF[old]

@@ -57,6 +57,10 @@ def test_duplicates_are_those_within_so_many_times_what_triangles_alone_make(pac
     monkeypatch.setattr(package("pipelines.shapes.distance"), "alike", alike)
     assert bpy.ops.object.omt_similar(bound=bound) == {"FINISHED"}
     assert selected() == {"Own", "At"}
+    for top in (1, 2, 3, 5):
+        assert bpy.ops.object.omt_similar(bound=bound, top=top, select="NOTHING") == {"FINISHED"}
+        told = [name for name, _ in package("session.last_run").state.summary.rows if name in raw]
+        assert told == ["At", "Beyond", "Far"][:top]
     assert bpy.ops.object.omt_similar(bound=bound, select="NEAREST") == {"FINISHED"}
     assert selected() == {"Own", "At"}
 

@@ -43,3 +43,18 @@ def test_moser_alone_has_areas_nearly_and_the_flow_takes_cost_off_it():
     assert sphere_figures(V, F, moser.positions).area_l1 < 0.02
     assert (np.diff(flow.flow.costs) < 0).all()
     assert sphere_figures(V, F, flow.positions).area_l1 < 0.01
+
+
+@pytest.mark.parametrize(("where", "folds"), [("apart", 0), ("onto a neighbour", 2), ("beyond a neighbour", 2)])
+def test_what_has_no_area_on_the_sphere_is_as_bad_as_what_is_folded(where, folds):
+    V, F = meshes.icosphere(2)
+    images = V.copy()
+    a, b = F[0, 0], F[0, 1]
+    if where == "onto a neighbour":
+        # The two faces at their edge have no area left.
+        images[a] = images[b]
+    elif where == "beyond a neighbour":
+        beyond = 1.3 * V[b] - 0.3 * V[a]
+        images[a] = beyond / np.linalg.norm(beyond)
+    found = sphere_figures(V, F, images).folds
+    assert found == folds if where != "beyond a neighbour" else found >= folds

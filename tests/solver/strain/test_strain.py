@@ -72,3 +72,16 @@ def test_the_mean_of_turned_copies_is_the_shape_and_what_is_off_stands_out():
     assert mean_shape(sizes * np.delete(shapes, 3, axis=0), np.ones(len(V)), True).deviation.max() < 0.2
     with pytest.raises(ValueError, match="two shapes"):
         mean_shape(shapes[:1], np.ones(len(V)))
+
+
+def test_a_mean_over_faces_that_fold_is_still_a_share():
+    """What is folded, or has no area in the map, counts as the worst that does not fold, in the mean as in the
+    histogram."""
+    V, F = bumpy(6, 6)
+    image = V[:, :2].copy()
+    image[10] += [1.5, 0.3]
+    found = beltrami(V, F, image)
+    assert (found.size > 1).any() and (found.size < 1).any()
+    middles = (np.arange(2000) + 0.5) / 2000
+    assert 0 < found.mean <= 1 and found.mean == pytest.approx(found.histogram(2000) @ middles, abs=1e-3)
+    assert (beltrami(V, F, V[:, :2] * [-1, 1]).mean, beltrami(V, F, V).mean) == pytest.approx((1, 0), abs=1e-9)
