@@ -39,10 +39,9 @@ def test_layouts_cover_what_the_uvs_cover(run, tmp_path, kind):
 
 @pytest.mark.parametrize("domain", ["disk", "square"])
 def test_diagrams_have_a_cell_for_every_vertex(run, tmp_path, domain):
-    scenes.bump()
-    # Of several meshes the one with most triangles.
-    for name in ("A Small One", "Zero"):
-        scenes.bump(2, 2).name = name
+    # Of several meshes the one with most triangles, wherever it stands among them.
+    for name, size in (("A Small One", (2, 2)), ("Bump", (8, 6)), ("Zero", (2, 2))):
+        scenes.bump(*size, name=name)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     files = ("diagram", tmp_path / "in.blend", "--domain", domain, "--json")
     status, out, err = run(*files, "-o", tmp_path / "d.obj")
