@@ -1,7 +1,6 @@
 """Solvers as generators: results, errors and fractions come through, also from a thread; a run has a log."""
 
 import threading
-import time
 
 import meshes
 import numpy as np
@@ -160,7 +159,7 @@ def test_a_solver_goes_on_all_the_way_and_is_at_its_end_when_it_says_so(name):
 def test_what_a_log_tells_of_a_stage_is_the_sum_of_what_its_clock_went_on(monkeypatch):
     """Also where a stage ends in an error, or is in another one."""
     clock = iter([10.0, 12.0, 20.0, 21.0, 24.0, 30.0, 100.0, 107.0])
-    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr("omt_uv.solver.progress.time.perf_counter", lambda: next(clock))
     log = RunLog()
     with log.timed("one"):
         pass
