@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .geometry import face_normals, lengths
+from .geometry import face_normals, lengths, of_corners
 from .topology import twins
 
 # Samples whose faces are tried for a query.
@@ -139,7 +139,7 @@ class ClosestPoint:
     @cached_property
     def _tree(self) -> cKDTree:
         owner, samples = self._spread
-        return cKDTree(np.column_stack([samples, self.normal_scale * self.normals[owner]]))
+        return cKDTree(np.column_stack([samples, self.normal_scale * self.normals.take(owner, axis=0)]))
 
     @cached_property
     def _plain(self) -> cKDTree:
@@ -217,7 +217,7 @@ class ClosestPoint:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
         faces = faces.copy()
         barycentric, distance = self.distance(points, faces)
-        active = np.flatnonzero((barycentric <= ON_EDGE).any(axis=1))
+        active = np.flatnonzero(of_corners(np.logical_or, barycentric <= ON_EDGE))
         for _ in range(WALK_ROUNDS):
             beyond = self.opposite.take(faces[active], axis=0)
             row, corner = np.nonzero((barycentric.take(active, axis=0) <= ON_EDGE) & (beyond >= 0))
@@ -237,16 +237,17 @@ class ClosestPoint:
     def at(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions (k,3) of points given by face and barycentric coordinates."""
         v, w = barycentric[:, 1], barycentric[:, 2]
-        a, ab, ac = (x.take(faces, axis=1) for x in (self._a, self._ab, self._ac))
+        a, ab, ac = (x.take(faces, axis=1, mode="clip") for x in (self._a, self._ab, self._ac))
         return (a + v * ab + w * ac).T
 
     def distance(self, points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Barycentric coordinates (k,3), or (k,c,3), of the closest points to points (k,3) on faces (k,) or (k,c), and
         squared distances."""
         p = points.T if faces.ndim == 1 else points.T[:, :, None]
-        ab, ac = self._ab.take(faces, axis=1), self._ac.take(faces, axis=1)
-        ap = p - self._a.take(faces, axis=1)
-        v, w = _in_frame(_product(ab, ap), _product(ac, ap), *self._frames.take(faces, axis=1))
+        # To clip numbers that are in range takes half of the time of looking whether they are.
+        a, ab, ac, frames = (x.take(faces, axis=1, mode="clip") for x in (self._a, self._ab, self._ac, self._frames))
+        ap = p - a
+        v, w = _in_frame(_product(ab, ap), _product(ac, ap), *frames)
         off = ap - v * ab - w * ac
         return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1), _product(off, off)
 
@@ -291,8 +292,8 @@ def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -
 
     A face is cut into k^2 similar ones, and their centroids are the points.
     """
-    p = vertices[triangles]
-    longest = lengths(p - p[:, [1, 2, 0]]).max(axis=1)
+    p = vertices.take(triangles.T, axis=0)
+    longest = lengths(p - p[[1, 2, 0]]).max(axis=0)
     level = np.maximum(np.ceil(longest / max(spacing, 1e-300)), 1)
     excess = np.sqrt((level**2).sum() / MOST_SAMPLES)
     if excess > 1:
@@ -303,8 +304,20 @@ def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -
         faces = np.flatnonzero(level == k)
         pattern = subdivision_centroids(int(k))
         owners.append(np.repeat(faces, len(pattern)))
-        points.append(np.einsum("sc,fcj->fsj", pattern, p[faces]).reshape(-1, 3))
+        points.append(points_in(p.take(faces, axis=1), pattern))
     return np.concatenate(owners), np.concatenate(points)
+
+
+def points_in(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Points (m r,3), one triangle after the other, at these barycentric coordinates (r,3) of each, by corners (3,m,3).
+
+    As an einsum has them to the bit, in a quarter of the time.
+    """
+    points = np.empty((corners.shape[1], len(places), 3))
+    a, b, c = corners
+    for k, (x, y, z) in enumerate(places):
+        points[:, k] = x * a + y * b + z * c
+    return points.reshape(-1, 3)
 
 
 def random_points(mass: np.ndarray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...mesh.geometry import lengths
 from ...mesh.topology import halfedges, next_halfedge, pair_keys, paired, previous_halfedge, twins
 from ..components.components import Component
 from .split_collapse import independent_splits, split_edges
@@ -38,7 +39,7 @@ def split_long_edges(component: Component, longest: np.ndarray, most: float = np
     first, twin = len(component.vertices), twins(component.triangles)
     for _ in range(MAX_ROUNDS):
         tail, head = halfedges(component.triangles)
-        length = np.linalg.norm(component.vertices[tail] - component.vertices[head], axis=1)
+        length = lengths(component.vertices.take(tail, axis=0) - component.vertices.take(head, axis=0))
         length /= (longest[tail] + longest[head]) / 2
         long = np.flatnonzero((length > 1) & (twin < np.arange(len(twin))))
         if not len(long) or len(component.vertices) - first >= most:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.geometry import cross3
+from ...mesh.geometry import cross3, of_corners
 from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
 
 # Cosine by which a face may turn at most when an edge at it collapses.
@@ -262,9 +262,9 @@ def _sound(
     keys.sort()
     common = np.bincount(keys[1:][keys[1:] == keys[:-1]] // n, minlength=k)
     sound = common == edges.sides
-    stays = at_end.sum(axis=1) == 1
-    old, mine = points[t[stays]], owner[stays]
-    new = np.where(at_end[stays][:, :, None], edges.place[mine][:, None], old)
+    stays = np.flatnonzero(of_corners(np.add, at_end.view(np.int8)) == 1)
+    old, mine = points.take(t.take(stays, axis=0), axis=0), owner[stays]
+    new = np.where(at_end.take(stays, axis=0)[:, :, None], edges.place.take(mine, axis=0)[:, None], old)
     before, after = (cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) for p in (old, new))
     length = np.sqrt(np.einsum("ij,ij->i", before, before) * np.einsum("ij,ij->i", after, after))
     turned = np.einsum("ij,ij->i", before, after)

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ...mesh.closest_point import ClosestPoint
+from ...mesh.geometry import lengths
 from ...mesh.topology import boundary_loops, halfedges
 from ..components.components import Component
 from .delaunay_flips import make_delaunay_embedded
@@ -125,8 +126,8 @@ def reach_vertex_count(mesh: WorkingMesh, count: int, sizing: SizeFunction, allo
             return mesh
         h = interior_edges(mesh.triangles, mesh.locked, mesh.twin)
         tail, head = halfedges(mesh.triangles)
-        a, b = mesh.points[tail[h]], mesh.points[head[h]]
-        length = np.linalg.norm(a - b, axis=1) / sizing((a + b) / 2)
+        a, b = (mesh.points.take(end[h], axis=0) for end in (tail, head))
+        length = lengths(a - b) / sizing((a + b) / 2)
         if deficit > 0:
             mesh = _split(mesh, h, length, deficit)
             continue

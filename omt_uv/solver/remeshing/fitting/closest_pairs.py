@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, subdivision_centroids
+from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, points_in, subdivision_centroids
 from ...mesh.geometry import face_areas
 from ...mesh.topology import expand
 from ..relaxation.surface_samples import SurfaceSamples
@@ -141,8 +141,8 @@ class Pairing:
             self._search_patch(mesh, self._patch, near)
         owner = np.repeat(np.arange(len(triangles)), len(self.places))
         bary = np.tile(self.places, (len(triangles), 1))
-        places = np.einsum("qc,mcj->mqj", self.places, points[triangles]).reshape(-1, 3)
-        far = self._on_surface(self.index, places, mesh.normals[owner]).points
+        places = points_in(points.take(triangles.T, axis=0), self.places)
+        far = self._on_surface(self.index, places, mesh.normals.take(owner, axis=0)).points
         corner = np.zeros(n, np.int64)
         corner[triangles.ravel()] = np.arange(triangles.size)
         at = VERTEX_WEIGHT * np.bincount(triangles.ravel(), np.repeat(area / 3, 3), n)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...mesh.geometry import of_corners
+
 
 @dataclass(frozen=True)
 class RingPatches:
@@ -33,7 +35,7 @@ def cut_patches(triangles: np.ndarray, middle: np.ndarray, n: int, rings: int) -
     label[triangles[middle].ravel()] = np.repeat(np.arange(len(middle)), 3)
     inner = _grown(triangles, label, rings)
     label = _spread(triangles, inner)
-    faces = np.flatnonzero((inner[triangles] >= 0).any(axis=1))
+    faces = np.flatnonzero(of_corners(np.maximum, inner[triangles]) >= 0)
     vertices, own = np.unique(triangles[faces], return_inverse=True)
     number = np.zeros(len(triangles), np.int64)
     number[faces] = np.arange(len(faces))
@@ -62,7 +64,7 @@ def _grown(triangles: np.ndarray, label: np.ndarray, rings: int) -> np.ndarray:
 
 def _spread(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
     """Labels (n,) of vertices, -1 for none, on all neighbours as well."""
-    around = label[triangles].max(axis=1)
+    around = of_corners(np.maximum, label[triangles])
     mine = np.flatnonzero(around >= 0)
     label = label.copy()
     np.maximum.at(label, triangles[mine].ravel(), np.repeat(around[mine], 3))
@@ -76,7 +78,7 @@ def spaced_faces(triangles: np.ndarray, faces: np.ndarray, n: int, rings: int, m
         rank = np.full(n, len(faces))
         np.minimum.at(rank, triangles[faces].ravel(), np.repeat(np.arange(len(faces)), 3))
         for _ in range(rings):
-            np.minimum.at(rank, triangles.ravel(), np.repeat(rank[triangles].min(axis=1), 3))
+            np.minimum.at(rank, triangles.ravel(), np.repeat(of_corners(np.minimum, rank[triangles]), 3))
         first = faces[(rank[triangles[faces]] == np.arange(len(faces))[:, None]).all(axis=1)]
         chosen = np.concatenate([chosen, first])
         near = np.zeros(n, dtype=bool)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ...mesh.geometry import cross3, face_normals, least_angles
+from ...mesh.geometry import cross3, face_normals, least_angles, of_corners
 from ...mesh.topology import halfedges
 
 # Angle, radians, below which forces set in,
@@ -42,7 +42,8 @@ def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> S
     """
     n, mine = len(points), np.flatnonzero(bad > 0)
     t, weight = triangles[mine], STRENGTH * bad[mine]
-    off = points[t] - points[t].mean(axis=1, keepdims=True)
+    p = points.take(t, axis=0)
+    off = p - (of_corners(np.add, p) / 3)[:, None]
     normal = face_normals(points, t)
 
     def turned(v, sign):

@@ -75,6 +75,6 @@ class SurfaceCarrier:
             np.int64
         )
         mass = samples.area * self.density[samples.faces] ** 2
-        off = mass[:, None] * (samples.points - points[near])
+        off = mass[:, None] * (samples.points - points.take(near, axis=0))
         moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)
         return SampleSums(np.bincount(near, samples.area, k), np.bincount(near, mass, k), moment)

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from ...linalg.nested_dissection import LARGE
 from ...linalg.sparse import solve_conjugate_gradients, solve_spd
 from ...mesh.closest_point import ClosestPoint, closest_on_triangles, spread_points
-from ...mesh.geometry import cotangent_laplacian, face_areas
+from ...mesh.geometry import cotangent_laplacian, face_areas, of_corners
 
 # Normals are smoothed over this share of an edge of the new mesh.
 BLUR = 0.2
@@ -110,14 +110,14 @@ def crest_samples(index: ClosestPoint) -> SurfaceSamples:
     """Sample crests and hollows; the area of a sample is weighed by how sharp the surface is there."""
     V, T = index.vertices, index.triangles
     sharp = np.maximum(sharpness(index) - BLUNT, 0)
-    mine = np.flatnonzero(sharp[T].max(axis=1) > 0)
+    mine = np.flatnonzero(of_corners(np.maximum, sharp[T]) > 0)
     if len(mine) == 0:
         return SurfaceSamples(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), mine)
     place, points = spread_points(V, T[mine], PITCH * index.spacing)
     share = (face_areas(V, T[mine]) / np.bincount(place, minlength=len(mine)))[place]
     faces = mine[place]
-    corners = T[faces]
-    bary = closest_on_triangles(points, V[corners[:, 0]], V[corners[:, 1]], V[corners[:, 2]])
+    corners = T.take(faces, axis=0)
+    bary = closest_on_triangles(points, *(V.take(corner, axis=0) for corner in corners.T))
     weight = share * np.einsum("sk,sk->s", bary, sharp[corners])
     kept = weight > NEGLIGIBLE * weight.max()
     return SurfaceSamples(points=points[kept], normals=index.normals[faces[kept]], area=weight[kept], faces=faces[kept])
