@@ -10,6 +10,7 @@ from omt_uv.solver.mesh.closest_point import (
     ClosestPoint,
     ClosestPointTracker,
     closest_on_triangles,
+    points_in,
     spread_points,
     subdivision_centroids,
 )
@@ -116,3 +117,11 @@ def test_centroids_of_a_subdivided_triangle(k):
     assert len(found) == k**2 and (found > 0).all()
     np.testing.assert_allclose(found.sum(axis=1), 1)
     np.testing.assert_allclose(found.mean(axis=0), 1 / 3)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_points_of_a_pattern_come_triangle_by_triangle(count):
+    rng = np.random.default_rng(0)
+    corners, places = rng.random((3, count, 3)), subdivision_centroids(3)
+    expected = [place @ corners[:, triangle] for triangle in range(count) for place in places]
+    np.testing.assert_allclose(points_in(corners, places), np.reshape(expected, (-1, 3)), atol=1e-15)
