@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import cross3
+from ..mesh.geometry import bounds, cross3, extents, of_corners
 
 # Bits of each coordinate along a Morton curve, and the masks that spread them.
 BITS = 21
@@ -25,7 +25,7 @@ SAME_MIDDLE = 1e9
 def order_of_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """The order (n,) of points (n,3); those in one place, as along a cut, go by where their triangles (m,3) are."""
     p, n = _in_own_frame(points), len(points)
-    low, high = p.min(axis=0), p.max(axis=0)
+    low, high = bounds(p)
     extent = max(float((high / 2 - low / 2).max()), float(np.finfo(float).tiny))
     # Off the borders of cells, where rounding would decide about vertices of a regular grid.
     cell = np.clip((p / 2 - low / 2) / extent * (2**BITS - 2) + OFF_BORDER, 0, 2**BITS - 1).astype(np.uint64)
@@ -34,7 +34,7 @@ def order_of_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     same = code[order][1:] == code[order][:-1]
     tied = np.flatnonzero(np.append(same, False) | np.append(False, same))
     if len(tied):
-        middle = p[triangles].mean(axis=1) / 2 - low / 2
+        middle = of_corners(np.add, p.take(triangles, axis=0)) / 3 / 2 - low / 2
         flat = triangles.ravel()
         count = np.maximum(np.bincount(flat, minlength=n), 1)
         around = [np.bincount(flat, np.repeat(x, 3), n) / count for x in middle.T]
@@ -63,7 +63,7 @@ def _in_own_frame(points: np.ndarray) -> np.ndarray:
 
 def _centred(points: np.ndarray) -> np.ndarray | None:
     """Points (n,3) about their mean, in units of their extent; None where they are in one place."""
-    extent = float(np.ptp(points / 2, axis=0).max())
+    extent = float(extents(points / 2).max())
     if not extent > 0:
         return None
     # By a power of two, which rounds nothing: sums of huge coordinates are infinite.

@@ -16,7 +16,7 @@ from ..errors import (
     plural,
 )
 from ..mesh.charts import Chart, charts_of, check_disks
-from ..mesh.geometry import cross3, lengths
+from ..mesh.geometry import cross3, extents, lengths
 from ..mesh.gluing import Gluing
 from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
@@ -139,7 +139,7 @@ def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int
 def _filled(surface: Surface, gluing: Gluing, fill: bool, sieve: int | None, told: tuple[str, ...]) -> DiskCharts:
     """Charts of a gluing that is not cut, with its holes filled, all or those of sieves, and what was said of it."""
     positions = surface.positions[surface.corner_vertex[gluing.triangles]] / 2
-    extent, holes = 2 * float(np.ptp(positions, axis=(0, 1)).max()), 0
+    extent, holes = 2 * float(extents(positions.reshape(-1, 3)).max()), 0
     if fill or sieve is not None:
         filled = fill_holes_of(surface, gluing, np.zeros(len(gluing.triangles), dtype=bool), None if fill else sieve)
         surface, gluing, holes = filled.surface, filled.gluing, filled.holes

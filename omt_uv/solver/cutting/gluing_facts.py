@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, lengths
+from ..mesh.geometry import angle_defects, angles_from_lengths, bounds, halfedge_lengths, lengths
 from ..mesh.gluing import Gluing, components
 from ..mesh.surface import Surface, is_seam, is_sharp
 from ..mesh.topology import distinct, first_places, halfedges, pair_keys
@@ -86,7 +86,7 @@ def in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
     """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
     used = distinct(gluing.vertex[gluing.triangles])[0]
     p = surface.positions[used]
-    low, high = p.min(axis=0), p.max(axis=0)
+    low, high = bounds(p)
     # Halves first: the difference of two huge numbers may be infinite.
     unit = 2 * float((high / 2 - low / 2).max()) or 1.0
     positions = np.zeros(surface.positions.shape)

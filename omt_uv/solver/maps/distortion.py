@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from ..mesh.geometry import cross2, cross3, face_areas, lengths, part_by_part
+from ..mesh.geometry import bounds, cross2, cross3, extents, face_areas, lengths, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quads
 from ..mesh.topology import distinct, graph_components, halfedges, order_of_pairs, pair_keys
 from .energy import AT_ONCE
@@ -119,7 +119,7 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -
     r_good, sheared = ratio[good], ~faces.turned
     w_sheared, s_sheared = w[sheared], faces.shear[sheared]
     any_sheared = bool(sheared.any())
-    corners = measured.uv.reshape(-1, 2)
+    low, high = bounds(measured.uv.reshape(-1, 2))
     return Distortion(
         faces=len(w),
         charts=faces.charts,
@@ -133,8 +133,8 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -
         seed_area=float((r_good + 1 / r_good).mean()) if len(r_good) else None,
         seed_angle=float((s_sheared + 1 / s_sheared).mean()) if any_sheared else None,
         overlap=overlap_share(measured.uv) if overlap else None,
-        uv_min=tuple(corners.min(0).tolist()),
-        uv_max=tuple(corners.max(0).tolist()),
+        uv_min=tuple(low.tolist()),
+        uv_max=tuple(high.tolist()),
         finite=True,
         skipped_zero_area_faces=int((~real).sum()) if polygons is None else len(np.unique(polygons[~real])),
     )
@@ -346,7 +346,7 @@ def _is_one_to_a_vertex(F, uv) -> bool:
 def _welded_corners(F, uv):
     """A number (m,3) for each place of a vertex in UVs (m,3,2): the same for corners that lie on one another."""
     corner = uv.reshape(-1, 2)
-    extent = np.ptp(corner, axis=0).max() + np.finfo(float).tiny
+    extent = extents(corner).max() + np.finfo(float).tiny
     u, v = np.round(corner / extent / WELD).T
     order = np.lexsort((v, u, F.ravel()))
     rows = np.stack([F.ravel()[order], u[order], v[order]])

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .geometry import lengths
+from .geometry import bounds, extents, lengths
 from .topology import distinct, halfedges, pair_keys, pair_up, row_labels
 
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
@@ -116,7 +116,7 @@ def _boxed(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None
     """Positions (n,3) in a box of extent 1, and half of its lowest corner (3,) and of its extent before; None where
     that is nothing or infinite."""
     # Halves first: the difference of two huge numbers may be infinite.
-    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
+    low, high = (corner / 2 for corner in bounds(positions))
     extent = float((high - low).max())
     return ((positions / 2 - low) / extent, low, extent) if extent > 0 and np.isfinite(extent) else None
 
@@ -134,7 +134,7 @@ class _Polygons:
         self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
         self.sides = np.bincount(self.polygon)
         self.first = np.cumsum(self.sides) - self.sides
-        self.extent = float(np.ptp(positions, axis=0).max())
+        self.extent = float(extents(positions).max())
         sums = [np.bincount(self.polygon, positions[self.vertex, k]) for k in range(3)]
         centres = np.stack(sums, axis=1) / self.sides[:, None]
         self.middle = centres.mean(axis=0)
@@ -261,11 +261,12 @@ def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     used, compact = distinct(triangles)
     if not len(used):
         return none
-    triangles, points = compact.reshape(-1, 3), positions[used] / 2
-    extent = float(np.ptp(points, axis=0).max())
+    triangles, points = compact.reshape(-1, 3), positions.take(used, axis=0) / 2
+    low, high = bounds(points)
+    extent = float((high - low).max())
     if not (extent > 0 and np.isfinite(extent)):
         return none
-    points = (points - points.min(axis=0)) / extent
+    points = (points - low) / extent
     centred = points - points.mean(axis=0)
     tree, probes = None, np.random.default_rng(0).permutation(len(points))[:PROBES]
     for number, normal in enumerate(_candidates(points, triangles)):
@@ -326,7 +327,7 @@ def _candidates(positions: np.ndarray, triangles: np.ndarray) -> Iterator[np.nda
     principal = np.linalg.eigh(points.T @ points)[1].T
     yield from principal
     distance = lengths(points)
-    extent = float(np.ptp(positions, axis=0).max())
+    extent = float(extents(positions).max())
     step = SAME_DISTANCE * max(extent, float(np.finfo(float).tiny))
     ring = np.round(distance / step).astype(np.int64)
     used = np.zeros(len(points), bool)

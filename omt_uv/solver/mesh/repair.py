@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
-from .geometry import cross3, edge_lengths, lengths, places
+from .geometry import cross3, edge_lengths, extents, lengths, places
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam, side_ends
 from .topology import (
@@ -252,7 +252,7 @@ def perturbed(
 
 def _size(vertices: np.ndarray) -> float:
     """How large a chart (n,3) is. Halves: the difference of two huge numbers may be infinite."""
-    return 2 * float(np.ptp(vertices / 2, axis=0).max())
+    return 2 * float(extents(vertices / 2).max())
 
 
 def _scale(size: float, extent: float) -> float:

@@ -92,7 +92,7 @@ def chosen_triangles(surface: Surface, faces: np.ndarray | None) -> tuple[np.nda
 def check_finite(positions: np.ndarray, triangles: np.ndarray) -> None:
     """Raise NonFiniteError unless the vertices of triangles (m,3) are somewhere."""
     used = distinct(triangles)[0]
-    wrong = used[~np.isfinite(positions[used]).all(axis=1)]
+    wrong = used[~of_corners(np.logical_and, np.isfinite(positions.take(used, axis=0)))]
     if len(wrong):
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
 

@@ -31,6 +31,7 @@ from ..maps.energy import (
 )
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import in_turn, restricted
+from ..mesh.geometry import of_corners
 from ..mesh.polygon_areas import BOTH
 from ..mesh.topology import order_of_numbers
 
@@ -393,7 +394,7 @@ def _in_axes(blocks: np.ndarray, triangles: np.ndarray, frame, free, symmetry: M
     plain = (frame[found] == 1) & free[found].all(axis=2)
     if symmetry is not None:
         plain &= ~symmetry.flip[triangles] & (symmetry.factor[triangles] == 1)
-    turned = np.flatnonzero(~plain.all(axis=1))
+    turned = np.flatnonzero(~of_corners(np.logical_and, plain))
     if not len(turned):
         return found
     # Rows of linear forms that say 1 and i, as forms of the steps along the axes.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.energy import Elements, elements
-from ..mesh.geometry import complex_cross, cross2, cross3, face_areas, lengths
+from ..mesh.geometry import complex_cross, cross2, cross3, face_areas, lengths, of_corners
 from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
@@ -272,7 +272,7 @@ def _places(V, flat, vertex, row, new, ahead, normal):
     total = weights.sum(1)[:, None]
     # Of a triangle without area: outside of it.
     weights = np.divide(weights, total, out=np.tile([-1.0, 1.0, 1.0], (len(total), 1)), where=total != 0)
-    order = np.lexsort((-weights.min(1), row))
+    order = np.lexsort((-of_corners(np.minimum, weights), row))
     around = order[np.searchsorted(row[order], np.arange(len(vertex)))]
     corner, share = new[around], weights[around]
     back = np.full(len(V), -1)

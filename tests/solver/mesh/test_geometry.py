@@ -10,12 +10,14 @@ from omt_uv.solver.mesh.geometry import (
     angles_from_lengths,
     as_complex,
     as_points,
+    bounds,
     cotangent_laplacian,
     cotangents_from_lengths,
     cross2,
     cross3,
     dot2,
     dot3,
+    extents,
     face_areas,
     face_normals,
     halfedge_lengths,
@@ -130,3 +132,12 @@ def test_parts_make_the_whole(count):
     parts = list(in_parts(a, 2 * a))
     np.testing.assert_array_equal(np.concatenate([x for x, _ in parts]), a)
     np.testing.assert_array_equal(np.concatenate([x for _, x in parts]), 2 * a)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_bounds_are_those_of_every_axis(d):
+    points = np.random.default_rng(d).standard_normal((50, d))
+    low, high = bounds(points)
+    np.testing.assert_array_equal(low, points.min(axis=0))
+    np.testing.assert_array_equal(high, points.max(axis=0))
+    np.testing.assert_array_equal(extents(points), np.ptp(points, axis=0))
