@@ -12,8 +12,8 @@ import numpy as np
 
 from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
-from ..maps.overlap import cover_pairs, covered_share
-from ..mesh.geometry import cross3, face_areas, lengths, signed_areas
+from ..maps.overlap import covered_share, part_covered
+from ..mesh.geometry import cross3, face_areas, lengths
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
@@ -418,7 +418,7 @@ def _lies_flat(
         gap <= GAP * extent
         and area >= filled * float(np.prod(_boxes(flat), axis=0).min())
         and covered_share(flat, corners, SAMPLES) <= COVERED
-        and _part_covered(flat, corners, np.flatnonzero(part[rows])) <= COVERED_PART
+        and part_covered(flat, corners, np.flatnonzero(part[rows])) <= COVERED_PART
     )
 
 
@@ -436,14 +436,3 @@ def _boxes(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Both extents (k,) of places (n,) complex turned in some ways."""
     turned = flat * np.exp(1j * np.pi / 2 * np.arange(TURNS) / TURNS)[:, None]
     return np.ptp(turned.real, axis=1), np.ptp(turned.imag, axis=1)
-
-
-def _part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> float:
-    """Which share of some triangles (p,) others of them (t,3) with places (k,) complex cover, too: a small part of them
-    is missed by samples of all."""
-    uv = np.stack([flat.real, flat.imag], axis=1)[corners]
-    inside = 0.75 * np.eye(3) + 0.25 / 3
-    point, over = cover_pairs(uv, np.einsum("kc,pcd->pkd", inside, uv[part]).reshape(-1, 2))
-    twice = np.unique(point[over != part[point // 3]])
-    area = np.abs(signed_areas(uv[part].reshape(-1, 2), np.arange(3 * len(part)).reshape(-1, 3)))
-    return float(area[twice // 3].sum() / (3 * area.sum()))

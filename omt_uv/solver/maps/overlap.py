@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import as_points, cross2
+from ..mesh.geometry import as_points, cross2, signed_areas
 from ..mesh.topology import expand, order_of_numbers
 from .contacts import lies_apart
 
@@ -55,6 +55,17 @@ def cover_pairs(uv: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndar
         begin += len(chunk)
     point, triangle = (np.concatenate(x) for x in zip(*found, strict=True))
     return point, triangle
+
+
+def part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> float:
+    """Which share of some triangles (p,) others of them (t,3) with places (k,) complex cover, too: a small part of them
+    is missed by samples of all."""
+    uv = np.stack([flat.real, flat.imag], axis=1)[corners]
+    inside = 0.75 * np.eye(3) + 0.25 / 3
+    point, over = cover_pairs(uv, np.einsum("kc,pcd->pkd", inside, uv[part]).reshape(-1, 2))
+    twice = np.unique(point[over != part[point // 3]])
+    area = np.abs(signed_areas(uv[part].reshape(-1, 2), np.arange(3 * len(part)).reshape(-1, 3)))
+    return float(area[twice // 3].sum() / (3 * area.sum()))
 
 
 def _chunks(points: np.ndarray, pairs: np.ndarray) -> list[np.ndarray]:

@@ -13,6 +13,7 @@ from short_cuts import component_of, gluing_of
 from omt_uv.solver.cutting import component as components
 from omt_uv.solver.cutting import crease_sides, cut_graph, cuts, gluing_facts, handle_partition, hole_filling
 from omt_uv.solver.cutting import symmetric_cut as symmetric
+from omt_uv.solver.maps.overlap import part_covered
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -198,10 +199,10 @@ def test_rows_of_two_groups_and_of_the_smaller():
 def test_a_part_that_is_covered_is_told_by_its_share():
     flat = np.array([0, 1, 1 + 1j, 1j, 0.2 + 0.1j, 0.9 + 0.1j, 0.2 + 0.8j, 5, 6, 5 + 1j]).astype(complex)
     corners = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9]])
-    assert crease_sides._part_covered(flat, corners, np.array([2])) == 1
-    assert crease_sides._part_covered(flat, corners, np.array([3])) == 0
+    assert part_covered(flat, corners, np.array([2])) == 1
+    assert part_covered(flat, corners, np.array([3])) == 0
     share = 0.245 / (0.245 + 0.5)
-    assert crease_sides._part_covered(flat, corners, np.array([2, 3])) == pytest.approx(share)
+    assert part_covered(flat, corners, np.array([2, 3])) == pytest.approx(share)
 
 
 def test_bands_join_what_is_blunt_and_large_sides_stay_apart():
