@@ -27,10 +27,10 @@ from omt_uv.solver.maps.energy import elements, energies, energy, gradient
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary, map_energy
 from omt_uv.solver.mesh.closest_point import spread_points
-from omt_uv.solver.mesh.edge_flips import longer_diagonals, shorter_diagonals
 from omt_uv.solver.mesh.geometry import cotangent_laplacian, face_areas, hat_gradients, least_angles
 from omt_uv.solver.mesh.polygon_areas import polygon_areas
 from omt_uv.solver.mesh.topology import boundary_loops, vertices_around
+from omt_uv.solver.quads.diagonals import longer_diagonals, shorter_diagonals
 from omt_uv.solver.refinement.initial_maps import inner_curvature, least_squares_conformal
 from omt_uv.solver.registration.functional_maps import descriptors
 from omt_uv.solver.registration.results import stretches

@@ -13,12 +13,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import MERGING, TURN_OUTSIDE, plural
-from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
 from ..mesh.surface import Surface, chosen_triangles
 from ..progress import Steps, drain, part_of
+from ..quads.diagonals import cut_along_shorter
 from .component import Copies, CutComponent, Topology, classify, make_component
 from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten

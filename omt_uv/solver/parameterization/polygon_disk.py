@@ -12,10 +12,10 @@ import numpy as np
 
 from ..maps.polygon_elements import polygon_mesh
 from ..mesh.charts import Chart
-from ..mesh.edge_flips import shorter_diagonals
 from ..mesh.geometry import cross2, cross3, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_fans
 from ..mesh.topology import boundary_loops, distinct
+from ..quads.diagonals import shorter_diagonals
 
 # Triangles of a polygon that is cut by its ears, at most: that takes the square of them.
 MOST_TRIANGLES = 500

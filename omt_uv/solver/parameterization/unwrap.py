@@ -18,10 +18,10 @@ from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural, without_room
 from ..mesh.charts import Chart
-from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.surface import Surface
 from ..mesh.topology import first_places
 from ..progress import Progress, Steps, part_of
+from ..quads.diagonals import cut_along_shorter
 from ..refinement.continuation_rules import PROMISED, QUALITIES
 from .chart_indices import (
     ChartPins,

@@ -9,7 +9,8 @@ from omt_uv.solver.linalg import additive_schwarz, kept_factor, sparse, symmetri
 from omt_uv.solver.linalg.vertex_rows import RowPattern, VertexRows, corner_pairs
 from omt_uv.solver.maps import polygon_elements
 from omt_uv.solver.maps.energy import energies
-from omt_uv.solver.mesh import edge_flips, geometry
+from omt_uv.solver.mesh import geometry
+from omt_uv.solver.quads import diagonals
 
 
 def quads(seed: int):
@@ -128,8 +129,8 @@ def test_what_gradients_start_from_is_overwritten_where_it_may_be(overwrite, gue
 def test_a_surface_that_is_cut_anew_is_the_same_in_half_of_the_memory(many, monkeypatch):
     V, P = hard_meshes.terrain(8, 5)
     given = hard_meshes.surface(V, P)
-    monkeypatch.setattr(edge_flips, "MANY", many)
-    before, found = given.triangles.copy(), edge_flips.cut_along_shorter(given)
+    monkeypatch.setattr(diagonals, "MANY", many)
+    before, found = given.triangles.copy(), diagonals.cut_along_shorter(given)
     assert found.triangles.dtype == (np.int32 if many == 0 else np.int64)
     np.testing.assert_array_equal(given.triangles, before)
     for polygon, two in zip(P, given.corner_vertex[found.triangles].reshape(-1, 2, 3), strict=True):

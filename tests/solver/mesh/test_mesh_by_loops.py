@@ -13,6 +13,7 @@ from omt_uv.solver.errors import EmptyMeshError, NonFiniteError
 from omt_uv.solver.mesh import closest_point, edge_flips, mirror, polygon_areas, repair, surface, topology
 from omt_uv.solver.mesh.geometry import below_one, bounding_box, complex_cross, face_areas, part_by_part
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.quads import diagonals
 
 
 @pytest.mark.parametrize("count", [10, 9000])
@@ -92,7 +93,7 @@ def test_quads_are_cut_along_the_shorter_diagonal_that_may_be(seed):
     V = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + rng.normal(0, 0.3, (60, 4, 2))
     V = np.concatenate([V, 0.1 * rng.normal(size=(60, 4, 1))], axis=2).reshape(-1, 3)
     quads, rank = np.arange(240).reshape(-1, 4), rng.permutation(240)
-    found = edge_flips._convex_and_longer(V, quads, rank)
+    found = diagonals._convex_and_longer(V, quads, rank)
     for k, q in enumerate(quads):
         p = V[q]
         own = np.cross(p[2] - p[0], p[3] - p[1])
@@ -103,18 +104,18 @@ def test_quads_are_cut_along_the_shorter_diagonal_that_may_be(seed):
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
     for least in range(4):
         rank = np.roll(np.arange(4), least)
-        assert edge_flips._convex_and_longer(square, np.arange(4)[None], rank)[0, 1] == (rank.argmin() % 2 == 1)
+        assert diagonals._convex_and_longer(square, np.arange(4)[None], rank)[0, 1] == (rank.argmin() % 2 == 1)
 
 
 def test_keys_that_are_there_several_times():
-    assert edge_flips._several(np.array([5, 3, 5, 7, 3, 9])).tolist() == [True, True, True, False, True, False]
+    assert diagonals._several(np.array([5, 3, 5, 7, 3, 9])).tolist() == [True, True, True, False, True, False]
 
 
 def test_surfaces_are_cut_along_shorter_diagonals_in_their_rows():
     V = np.array([[0, 0, 0], [2, 0.2, 0], [1.5, 1, 0], [0, 1, 0], [4, 0, 0], [4, 1, 0]], float)
     quads = [[0, 1, 2, 3], [1, 4, 5, 2]]
     given = meshes.polygon_surface(V, quads)
-    found = edge_flips.cut_along_shorter(given)
+    found = diagonals.cut_along_shorter(given)
     assert (found.triangle_face == given.triangle_face).all()
     for face, quad in enumerate(quads):
         rows = found.corner_vertex[found.triangles[found.triangle_face == face]]
@@ -126,7 +127,7 @@ def test_surfaces_are_cut_along_shorter_diagonals_in_their_rows():
         assert face_areas(V, rows).sum() == pytest.approx(
             face_areas(before.reshape(-1, 3), np.arange(6).reshape(2, 3)).sum()
         )
-    again = edge_flips.cut_along_shorter(found)
+    again = diagonals.cut_along_shorter(found)
     np.testing.assert_array_equal(np.sort(again.triangles, axis=1), np.sort(found.triangles, axis=1))
 
 
