@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..mesh.geometry import (
 )
 from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import first_places, halfedges
+from ..quads.recombination import with_shorter_diagonals
 from .component_order import in_order
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
@@ -211,6 +212,29 @@ def make_component(
         polygons=gluing.owner[members],
         vertex_ids=vertex_ids,
         avoid=avoid[vertex_ids],
+    )
+
+
+def with_quads(component: CutComponent, diagonal: np.ndarray) -> CutComponent:
+    """A component with quads in the place of the triangles beside diagonals (e,) bool, cut along the shorter ones."""
+    rows = np.flatnonzero(diagonal)
+    if not len(rows):
+        return component
+    one, other = component.pair[rows].T // 3
+    triangles, place = with_shorter_diagonals(component.positions, component.triangles, component.pair[rows])
+    pair, cost, polygons = place[component.pair], component.cost.copy(), component.polygons.copy()
+    cost[rows], polygons[other] = np.inf, polygons[one]
+    tail, head = halfedges(triangles)
+    ends = np.stack([tail[pair[:, 0]], head[pair[:, 0]]], axis=1)
+    return replace(
+        component,
+        triangles=triangles,
+        pair=pair,
+        ends=ends,
+        length=edge_lengths(component.positions, ends),
+        cost=cost,
+        boundary=place[component.boundary],
+        polygons=polygons,
     )
 
 

@@ -17,10 +17,10 @@ from ..mesh.geometry import cross3, face_areas, lengths
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
-from .component import SMOOTH, CutComponent, make_component
+from .component import SMOOTH, CutComponent, make_component, with_quads
 from .cut_graph import cut_classes
 from .developable_nets import BENT, HARD, MUCH, defects, net
-from .gluing_facts import cost_factors, marked_triangles
+from .gluing_facts import cost_factors, diagonal_pairs, marked_triangles
 
 # Components with less than this share of the area stay whole: of thousands of pieces none is looked at.
 VISIBLE = 1e-3
@@ -92,11 +92,13 @@ def hard_borders(
     positions: np.ndarray,
     gone: np.ndarray,
     wants: Callable[[np.ndarray, bool], bool],
+    as_drawn: bool = False,
 ) -> np.ndarray:
     """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which bodies of hard sides come apart.
 
     Bodies with a net that is short enough and lies beside itself, and those that are not searched, stay whole;
-    positions (n,3) in a unit box, wants: see `cuts.SeamFinder`
+    positions (n,3) in a unit box, wants: see `cuts.SeamFinder`; as_drawn : creases count whether a body swells or not,
+    and those that are diagonals of quads it was triangulated from
     """
     left, number, found = gluing.without(gone), np.flatnonzero(~gone), np.zeros(len(gone), dtype=bool)
     component_of, classes = components(left), corner_classes(left)
@@ -108,12 +110,19 @@ def hard_borders(
         return found
     marked = np.unique(component_of[marked_triangles(surface, left)])
     free, factor, members = np.zeros(len(positions)), cost_factors(surface, left), groups(component_of)
-    pairs = groups(np.append(component_of[left.first // 3], np.arange(len(members))))
+    pairs, diagonal = groups(np.append(component_of[left.first // 3], np.arange(len(members)))), None
     for k in creased:
         if not wants(left.owner[members[k]], bool(np.isin(k, marked))):
             continue
         component = make_component(left, positions, classes, members[k], pairs[k][pairs[k] < len(number)], free, factor)
-        sides = hard_sides(component)
+        sides = hard_sides(component, as_drawn)
+        if sides is not None and not as_drawn:
+            # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
+            diagonal = diagonal_pairs(left, positions, factor) if diagonal is None else diagonal
+            component = with_quads(component, diagonal[component.gluing_pair])
+            sides = hard_sides(component)
+            if sides is None:
+                continue
         if sides is None:
             found[number[component.gluing_pair[cap_borders(component)]]] = True
         elif not _has_clear_net(component):
@@ -163,9 +172,9 @@ def _has_clear_net(component: CutComponent) -> bool:
     )
 
 
-def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
+def hard_sides(component: CutComponent, may_swell: bool = False) -> tuple[np.ndarray, np.ndarray] | None:
     """The side (m,) of every triangle of a component of a hard surface, and which sides (s,) bool unroll; None of any
-    other."""
+    other, and of one that swells unless it may."""
     fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     joined, count, length = component.pair // 3, len(component.triangles), component.length
     tight = _tight(component, fold)
@@ -184,7 +193,7 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
     # Of noise every triangle is a side.
     few = len(area) <= MOST_SIDES
-    if len(area) > SIMPLE and _swells(component, side, border, fold, area, bent):
+    if not may_swell and len(area) > SIMPLE and _swells(component, side, border, fold, area, bent):
         return None
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
     unrolled = area[unrolls].sum() >= ALL * area.sum()

@@ -57,6 +57,10 @@ class SeamFinder(Protocol):
     def stays_whole(self) -> bool:
         """Whether bodies of hard sides do not come apart along these."""
 
+    @property
+    def as_drawn(self) -> bool:
+        """Whether all creases count for sides, see `crease_sides.hard_borders`."""
+
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
@@ -173,7 +177,7 @@ def cut_gluing(
         gone = partition_pairs(gluing, positions, one_sided)
     crowded = bool(gone.any())
     if search is not None and avoid is None and not search.stays_whole:
-        gone |= hard_borders(surface, gluing, positions, gone, search.wants)
+        gone |= hard_borders(surface, gluing, positions, gone, search.wants, search.as_drawn)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
     holes, sieves, level = 0, not fill, np.zeros(len(gluing.triangles), dtype=bool)
@@ -409,10 +413,7 @@ def cut_component(
 def _plain_cut(component: CutComponent, topology: Topology, k: int, extremities: int) -> tuple[np.ndarray, np.ndarray]:
     """What `cut_component` finds where nothing is to be symmetric."""
     closed = topology.boundaries[k] == 0
-    if closed and topology.handles[k] == 0:
-        tips = first_tips(component)
-    else:
-        tips = np.zeros(0, dtype=np.int64)
+    tips = first_tips(component) if closed and topology.handles[k] == 0 else np.zeros(0, dtype=np.int64)
     if closed and len(tips) == 0:
         chosen = _best_root(component)
     else:

@@ -10,7 +10,11 @@ from ..mesh.geometry import angle_defects, angles_from_lengths, bounds, halfedge
 from ..mesh.gluing import Gluing, components
 from ..mesh.surface import Surface, is_seam, is_sharp
 from ..mesh.topology import distinct, first_places, halfedges, pair_keys
+from ..quads.recombination import quad_diagonals
 from .component import SEAM, SHARP
+
+# Edges that are marked are meant to be up to that share of all.
+MEANT = 0.5
 
 
 def cost_factors(surface: Surface, gluing: Gluing) -> np.ndarray:
@@ -22,6 +26,20 @@ def cost_factors(surface: Surface, gluing: Gluing) -> np.ndarray:
     factor = np.where(is_sharp(surface, key) | gluing.parallel(), SHARP, 1.0)
     factor[is_seam(surface, key)] = SEAM
     return factor
+
+
+def diagonal_pairs(gluing: Gluing, positions: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Pairs (p,) bool that are diagonals of quads which a gluing was triangulated from, none of them marked.
+
+    positions (n,3) of the surface, in a unit box; factor (p,) : see `cost_factors`
+    """
+    polygon = distinct(gluing.owner)[1]
+    pair, marked = np.stack([gluing.first, gluing.second], axis=1), factor < 1
+    # Flat shading makes most edges sharp, and means none.
+    marked &= np.count_nonzero(marked) <= MEANT * len(marked)
+    may = (np.bincount(polygon)[polygon] == 1)[pair // 3].all(axis=1) & ~marked
+    may[may] = quad_diagonals(positions, gluing.vertex[gluing.triangles], pair[may])
+    return may
 
 
 def total_curvature(gluing: Gluing, corner_class: np.ndarray, component_of: np.ndarray, positions) -> np.ndarray:

@@ -197,8 +197,17 @@ def _cut_anew(search: ShearSearch, last: Round, asked: Asked, map_charts, early:
     return Round.of(search, again.charts, mapped, cuts, memory, last.settled, last.slits)
 
 
+def _along_all_creases(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
+    """A round that misses its bound, or where it misses it by less one whose charts come apart along all creases."""
+    again = (last.searched, last.kept(last.searched), search.first_spread(), {"as_drawn": True})
+    new = yield from _cut_anew(search, last, Asked(*again, lambda edges: True), map_charts, early)
+    return last if new is None or new.excess >= last.excess else new
+
+
 def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, early: EarlyEnd) -> Steps[Round]:
     """The last round with areas spared where it misses the bound, and with shorter cuts where it does not."""
+    if last.excess > NEARLY * last.bound:
+        last = yield from part_of(_along_all_creases(search, last, map_charts, early), 0.0, 0.0)
     if last.excess:
         return (yield from _with_areas_spared(search, last, map_sparing, early))
     last = yield from part_of(_taken_back(search, last, map_charts, early), 0.0, 0.4)
@@ -404,14 +413,6 @@ def in_pieces(
         new_maps += found[1]
         edges.append(between)
     return replace(prepared, charts=new_charts, cuts=joined(search, cuts, np.concatenate(edges))), new_maps
-
-
-def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
-    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
-    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
-    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
-    most = float(pressing.max(initial=0.0)) / search.shear.bound
-    return most <= 1 or most > 1 + NEARLY
 
 
 def _pieces(

@@ -424,3 +424,11 @@ def pressing_shear(mean: float, steep: float, bound: float) -> float:
 def joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
     """The same cuts, but along the edges (e,2)."""
     return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
+
+
+def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
+    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
+    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
+    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
+    most = float(pressing.max(initial=0.0)) / search.shear.bound
+    return most <= 1 or most > 1 + NEARLY

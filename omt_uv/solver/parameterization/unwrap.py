@@ -46,8 +46,8 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import bound_shear, in_pieces, is_worth_bounding
-from .shear_search import ShearSearch
+from .shear_bound import bound_shear, in_pieces
+from .shear_search import ShearSearch, is_worth_bounding
 from .small_charts import is_small, map_together
 
 # Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps; at last those of pieces.

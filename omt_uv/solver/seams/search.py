@@ -79,6 +79,7 @@ class SeamSearch:
     adding : what was found for a part stays, and more is cut
     straighter : what was found for a part stays, but is led along edges that turn less
     stays_whole : bodies of hard sides do not come apart along these
+    as_drawn : nothing else has helped, and they do along all creases, see `crease_sides.hard_borders`
     memory : what was found for parts, by their fingerprints, to which this search adds
     begun : surfaces of components on their way to coarse ones, and their triangles
     asked : the square of log(shear) that maps may have
@@ -97,6 +98,7 @@ class SeamSearch:
     adding: bool = False
     straighter: bool = False
     stays_whole: bool = False
+    as_drawn: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
     begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
     asked: float = 0.0

@@ -1,13 +1,18 @@
 """Bodies of flat and round sides come apart along their creases, and lie undistorted; all others stay whole."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.crease_sides import _part_covered, cap_borders, hard_sides, lone_edges, side_borders
-from omt_uv.solver.mesh.surface import Surface, triangle_surface
-from omt_uv.solver.mesh.topology import graph_components
+from omt_uv.solver.cutting.crease_sides import cap_borders, hard_borders, hard_sides, lone_edges, side_borders
+from omt_uv.solver.cutting.gluing_facts import in_unit_box
+from omt_uv.solver.maps.overlap import part_covered
+from omt_uv.solver.mesh.repair import repaired_gluing
+from omt_uv.solver.mesh.surface import Surface, chosen_triangles, triangle_surface
+from omt_uv.solver.mesh.topology import graph_components, pair_keys
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -202,7 +207,7 @@ def test_a_small_part_that_lies_on_a_large_one_is_seen():
     for move, share in ((0.0, 1.0), (1.0, 0.0)):
         flat = np.concatenate([V[:, :2], small + [move, 0]]) @ [1, 1j]
         corners = np.concatenate([F, len(V) + np.arange(3)[None]])
-        assert _part_covered(flat, corners, np.array([len(F)])) == share
+        assert part_covered(flat, corners, np.array([len(F)])) == share
 
 
 def test_a_relief_with_holes_is_not_cut_to_them():
@@ -417,3 +422,53 @@ def test_the_bevel_of_an_end_is_not_combed():
     assert len(found.charts) == 3 and shear < 1.03
     wall = max(found.charts, key=lambda chart: len(chart.triangles))
     assert len(wall.vertices) == 33 * len(profile)
+
+
+def borders_of(surface, sharp=(), **options):
+    """The keys of the edges along which a surface comes apart."""
+    surface = replace(surface, sharp=np.array(sharp, np.int64).reshape(-1, 2))
+    gluing = repaired_gluing(surface, *chosen_triangles(surface, None)).gluing
+    positions = in_unit_box(surface, gluing)[0]
+    gone = np.zeros(len(gluing.first), bool)
+    found = hard_borders(surface, gluing, positions, gone, lambda *_: True, **options)
+    return set(pair_keys(*gluing.ends(gluing.first[found])).tolist())
+
+
+def twisted_column():
+    """Four sides of eight quads that swell and turn, between two more: their longer diagonals fold as edges do."""
+    way, level = np.pi / 2 * np.arange(4), np.arange(9)
+    wide, turn = 1 + 0.6 * np.sin(np.pi * level / 8), 0.6 * level
+    rings = [
+        np.column_stack([r * np.cos(way + t), r * np.sin(way + t), np.full(4, z)])
+        for r, t, z in zip(wide, turn, level, strict=True)
+    ]
+    i, k = np.tile(np.arange(4), 8), np.repeat(np.arange(8), 4)
+    j = (i + 1) % 4
+    quads = np.stack([4 * k + j, 4 * k + 4 + j, 4 * k + 4 + i, 4 * k + i], axis=1)
+    return np.concatenate(rings), np.concatenate([quads, [[3, 2, 1, 0], [32, 33, 34, 35]]])
+
+
+@pytest.mark.parametrize("shaded", [False, True])
+def test_a_body_that_was_triangulated_is_told_by_its_quads(shaded):
+    """It swells, and stays whole as it does of quads; as it is drawn it comes apart. Flat shading means nothing."""
+    V, Q = twisted_column()
+    F = triangles_of(Q)
+    sharp = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]) if shaded else ()
+    assert not borders_of(triangle_surface(V, F), sharp)
+    assert borders_of(triangle_surface(V, F), sharp, as_drawn=True)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_hard_body_that_was_triangulated_comes_apart_as_it_does_of_quads(turned):
+    V, Q = washer()
+    faces, corners = len(Q), np.arange(Q.size).reshape(-1, 4)
+    quads = Surface(
+        positions=V,
+        corner_vertex=Q.ravel(),
+        face_start=4 * np.arange(faces + 1),
+        triangles=corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3),
+        triangle_face=np.repeat(np.arange(faces), 2),
+        seams=np.zeros((0, 2), np.int64),
+    )
+    apart = borders_of(quads)
+    assert apart and borders_of(triangle_surface(V, triangles_of(np.roll(Q, 1, axis=1) if turned else Q))) == apart

@@ -302,10 +302,18 @@ def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
         assert asked == [[last.charts[1]]] and made == [[last.maps[0], "spared"]]
 
 
-@pytest.mark.parametrize("excess", [False, True])
-def test_a_round_is_made_shorter_only_within_the_bound(excess, monkeypatch):
+@pytest.mark.parametrize(
+    ("shear", "asked"),
+    [
+        (1.2, ["_taken_back", "_parts_cut_anew", "_straightened"]),
+        (1.38, ["_with_areas_spared"]),
+        (1.5, ["_along_all_creases", "_with_areas_spared"]),
+    ],
+)
+def test_a_round_is_made_shorter_only_within_the_bound(shear, asked, monkeypatch):
+    """What misses it by much comes apart before areas are spared."""
     calls = []
-    for name in ("_with_areas_spared", "_taken_back", "_parts_cut_anew", "_straightened"):
+    for name in ("_along_all_creases", "_with_areas_spared", "_taken_back", "_parts_cut_anew", "_straightened"):
 
         def steps(search, last, *_, name=name):
             calls.append(name)
@@ -313,9 +321,29 @@ def test_a_round_is_made_shorter_only_within_the_bound(excess, monkeypatch):
             yield
 
         monkeypatch.setattr(shear_bound, name, steps)
-    last = round_of([1], [1.5 if excess else 1.2])
+    last = round_of([1], [shear])
     assert drain(shear_bound._made_shorter(None, last, None, None, EarlyEnd())) is last
-    assert calls == (["_with_areas_spared"] if excess else ["_taken_back", "_parts_cut_anew", "_straightened"])
+    assert calls == asked
+
+
+@pytest.mark.parametrize(("after", "taken"), [(None, False), (1.5, False), (1.49, True), (1.1, True)])
+def test_what_misses_its_bound_comes_apart_along_all_creases_where_that_helps(after, taken, monkeypatch):
+    """All that was searched is cut anew, from nothing, and creases count as they are drawn."""
+    last, new = round_of([1, 1, 1], [1.5, 1.2, 1.5]), None if after is None else round_of([1, 1, 1], [after, 1.2, 1.5])
+    asked = []
+
+    def cut_anew(search, before, what, map_charts, early):
+        asked.append(what)
+        return new
+        yield
+
+    monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
+    monkeypatch.setattr(shear_bound.Round, "kept", lambda self, chosen: ("kept", *chosen))
+    search = SimpleNamespace(first_spread=lambda: "spread")
+    found = drain(shear_bound._along_all_creases(search, last, None, EarlyEnd()))
+    assert found is (new if taken else last)
+    assert (asked[0].charts, asked[0].kept, asked[0].spread) == ([0, 2], ("kept", 0, 2), "spread")
+    assert asked[0].changes == {"as_drawn": True} and asked[0].is_worth(last.cuts)
 
 
 @pytest.mark.parametrize(

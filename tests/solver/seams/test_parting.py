@@ -183,7 +183,7 @@ def top_of(teeth):
 def test_flat_sides_come_off_a_body_that_is_round_otherwise_though_it_keeps_the_bound(monkeypatch):
     """A gear that is not taken for a hard body, nor has a net, as it would not with a round handle."""
     monkeypatch.setattr(cuts, "net", lambda component: None)
-    monkeypatch.setattr(cuts, "hard_borders", lambda surface, gluing, positions, gone, wants: np.zeros_like(gone))
+    monkeypatch.setattr(cuts, "hard_borders", lambda surface, gluing, positions, gone, *_: np.zeros_like(gone))
     surface = meshes.polygon_surface(*gear(4))
     found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.6)))
     assert np.isin(found.seams, top_of(4)).all(axis=1).sum() >= 16
