@@ -38,25 +38,21 @@ QUARTERS = (0, 1, 3)
 FIRST_SHARE = 0.75
 SMALLER = 0.95
 HASTE = 0.99
-# Larger scales are tried up to this factor, which is halved with every one that does not fit, down to the other.
+# An order has room at larger scales by this factor, by its root where it has not, and so on, down to the other. By that
+# one scales are larger that other orders are tried at.
 LARGER = 1.04
 EXACT = 1.004
 # A scale this much below the first one that was tried is none: the margins fill the square.
 LEAST_SCALE = 1e-3
 # Orders that are tried at a scale: what found no room comes first in the second and the third; others are by sizes
-# that chance has changed by about this much, as a logarithm. On the finer raster, which costs eight times as much, they
-# are fewer.
+# that chance has changed by about this much, as a logarithm.
 ORDERS = 8
-FINE_ORDERS = 4
 STUCK_FIRST = 2
 CHANCE = 0.15
 # Of so many items or more, which take longer, only the first of them are, and those if this share of all cells found a
 # place before.
 MANY_ITEMS = 100
 HOPEFUL = 0.8
-# Larger scales are given up after so many that did not fit, on either raster.
-TIRED = 4
-FINE_TIRED = 2
 # Boxes of islands that go into blocks are so much apart, in cells, at least.
 APART = 1e-6
 # Coordinates beyond 2 to this power, or its inverse, are scaled before they are squared.
@@ -90,11 +86,6 @@ class _PackTask:
     def cells_per_pixel(self) -> float:
         """Cells of the raster per pixel."""
         return self.raster / self.texture_size
-
-    @property
-    def tries(self) -> tuple[int, int]:
-        """Orders at a scale, and scales that do not fit, before the search gives up."""
-        return (ORDERS, TIRED) if self.raster == COARSE else (FINE_ORDERS, FINE_TIRED)
 
     @property
     def growth(self) -> float:
@@ -236,7 +227,7 @@ def _first(task: _PackTask) -> Steps[_Found]:
     step = SMALLER
     while scale >= LEAST_SCALE * start:
         yield Progress("Packing", 0.0)
-        found, order = _fit(task, scale, order)
+        found, order = _fit(task, scale, order, STUCK_FIRST + 1)
         if found is not None:
             return found
         scale *= step
@@ -245,26 +236,30 @@ def _first(task: _PackTask) -> Steps[_Found]:
 
 
 def _larger(found: _Found, most: float) -> Steps[_Found]:
-    """Larger scales than one that fits, by a factor of `most` at most, until too many in a row do not fit.
+    """Larger scales than one that fits, by a factor of `most` at most: as large as its order has room for, then as
+    large as others have that fit where it does not, until none of them does.
 
     What is found is on the raster of the task of `found`, if anything is: otherwise it is what was given.
     """
-    task, order, scale = found.task, found.order, found.scale
-    fails, tries, best = most * scale, 0, found
-    tired = task.tries[1]
-    while tries < tired and fails > EXACT * scale:
-        yield Progress("Packing", tries / tired)
-        tried = min(np.sqrt(scale * fails), LARGER * scale)
-        new, order = _fit(task, tried, order)
+    task, order, limit, best, others = found.task, found.order, most * found.scale, found, 0
+    while EXACT * best.scale <= limit:
+        step = LARGER
+        while step > EXACT:
+            yield Progress("Packing", others / (others + 1))
+            new, order = _fit(task, min(step * best.scale, limit), order, 1)
+            best, order, step = (best, order, np.sqrt(step)) if new is None else (new, new.order, step)
+            step = min(step, limit / best.scale)
+        yield Progress("Packing", others / (others + 1))
+        scale = EXACT * best.scale
+        new, order = (None, order) if scale > limit else _fit(task, scale, order, ORDERS)
         if new is None:
-            fails, tries = tried, tries + 1
-        else:
-            best, scale, order, tries = new, tried, new.order, 0
+            break
+        best, order, others = new, new.order, others + 1
     return best
 
 
-def _fit(task: _PackTask, scale: float, order: list[int]) -> tuple[_Found | None, list[int]]:
-    """The items placed at a scale, if a few orders find them a place; and the order to begin with at the next one."""
+def _fit(task: _PackTask, scale: float, order: list[int], orders: int) -> tuple[_Found | None, list[int]]:
+    """The items placed at a scale, if one of so many orders finds them a place; and the one to begin with next time."""
     raster = _rasterised(task, scale)
     sizes = np.array([item.turns[0].mask.size for item in raster.items], dtype=float)
     if len(order) != len(raster.items):
@@ -276,7 +271,7 @@ def _fit(task: _PackTask, scale: float, order: list[int]) -> tuple[_Found | None
     # The same draws at every scale: what has fitted at one is tried at the next.
     rng, tried, many = np.random.default_rng(0), order, len(cells) >= MANY_ITEMS
     empty, failed = _grid(task, widest), dict[tuple[int, ...], int]()
-    for k in range(min(task.tries[0], STUCK_FIRST + 1) if many else task.tries[0]):
+    for k in range(min(orders, STUCK_FIRST + 1) if many else orders):
         # Of few items chance has the same orders again.
         if tuple(tried) not in failed:
             places, failed[tuple(tried)] = place(raster.items, tried, empty.copy())

@@ -117,7 +117,6 @@ def task_of(**given):
         "outlines": [1, 2],
         "margin": 3.0,
         "staying": [],
-        "tries": (8, 3),
         "texture_size": 1024,
     }
     return SimpleNamespace(**fields | given)
@@ -127,7 +126,8 @@ def task_of(**given):
 def test_smaller_scales_are_tried_until_one_fits(fits, monkeypatch):
     scales = []
 
-    def fit(task, scale, order):
+    def fit(task, scale, order, orders):
+        assert orders == 3
         scales.append(scale)
         return (("found", scale) if len(scales) == fits else None), [*order, 1]
 
@@ -146,29 +146,24 @@ def test_smaller_scales_are_tried_until_one_fits(fits, monkeypatch):
     np.testing.assert_allclose(scales, expected)
 
 
-@pytest.mark.parametrize("most", [1.1, np.inf])
-def test_larger_scales_are_tried_until_too_many_in_a_row_do_not_fit(most, monkeypatch):
-    tried, limit = [], 1.06
+@pytest.mark.parametrize("most", [1.05, 1.2, np.inf])
+def test_larger_scales_are_tried_while_an_order_has_room_and_then_with_others(most, monkeypatch):
+    """The first order has room up to 1.06, others up to 1.1 and 1.13, and none beyond."""
+    tried, room = [], [1.06, 1.1, 1.13]
 
-    def fit(task, scale, order):
-        tried.append(scale)
-        fits = scale <= limit
-        return (pack_square._Found(task, scale, None, [], [len(tried)]) if fits else None), order
+    def fit(task, scale, order, orders):
+        (number,) = order
+        tried.append((scale, orders))
+        better = next((k for k in range(number, 3 if orders > 1 else number + 1) if scale <= room[k]), None)
+        return (None, order) if better is None else (pack_square._Found(task, scale, None, [], [better]), order)
 
     monkeypatch.setattr(pack_square, "_fit", fit)
     start = pack_square._Found(task_of(), 1.0, None, [], [0])
     found = drain(pack_square._larger(start, most))
-    scale, fails, misses, expected = 1.0, most, 0, []
-    while misses < 3 and fails > 1.004 * scale:
-        one = min(np.sqrt(scale * fails), 1.04 * scale)
-        expected.append(one)
-        if one <= limit:
-            scale, misses = one, 0
-        else:
-            fails, misses = one, misses + 1
-    np.testing.assert_allclose(tried, expected)
-    assert found.scale == pytest.approx(scale) and 1.04 <= scale <= limit
-    monkeypatch.setattr(pack_square, "_fit", lambda task, scale, order: (None, order))
+    end = min(room[-1], most)
+    assert end / 1.0081 <= found.scale <= end and max(scale for scale, _ in tried) <= min(most, 1.04 * end)
+    assert {orders for _, orders in tried} == ({1} if most == 1.05 else {1, pack_square.ORDERS})
+    monkeypatch.setattr(pack_square, "_fit", lambda task, scale, order, orders: (None, order))
     assert drain(pack_square._larger(start, most)) is start
 
 
@@ -183,7 +178,7 @@ def test_what_found_no_room_comes_first_in_the_next_orders(failures, orders, mon
     items = [SimpleNamespace(turns=[SimpleNamespace(mask=np.ones((k + 1, 2)))], widest=3, cells=4) for k in range(5)]
     monkeypatch.setattr(pack_square, "_rasterised", lambda task, scale: SimpleNamespace(items=items))
     monkeypatch.setattr(pack_square, "place", place)
-    found, order = pack_square._fit(task_of(), 1.0, [])
+    found, order = pack_square._fit(task_of(), 1.0, [], 8)
     assert tried[0] == [4, 3, 2, 1, 0] and len(tried) <= orders
     if failures:
         assert tried[1] == [0, 4, 3, 2, 1]
@@ -195,13 +190,13 @@ def test_what_found_no_room_comes_first_in_the_next_orders(failures, orders, mon
     assert (found is None) == (failures == 99) and (found is not None or order == [4, 3, 2, 1, 0])
     assert found is None or found.order == tried[-1] == order
     tried.clear()
-    again, _ = pack_square._fit(task_of(), 1.0, [2, 1, 0, 3, 4])
+    again, _ = pack_square._fit(task_of(), 1.0, [2, 1, 0, 3, 4], 8)
     assert tried[0] == [2, 1, 0, 3, 4]
     items[0].cells = 64**2
     tried.clear()
-    assert pack_square._fit(task_of(), 1.0, [])[0] is None and not tried
+    assert pack_square._fit(task_of(), 1.0, [], 8)[0] is None and not tried
     items[0].cells, items[0].widest = 4, 65
-    assert pack_square._fit(task_of(), 1.0, [])[0] is None and not tried
+    assert pack_square._fit(task_of(), 1.0, [], 8)[0] is None and not tried
 
 
 def test_islands_fill_the_square_but_for_half_of_the_margin():
