@@ -258,7 +258,7 @@ class _Body:
     def packed(self, cut: np.ndarray) -> float:
         """What the pieces that a cut (e,) bool leaves fill of a square when they are packed."""
         charts, maps = self.pieces(cut)
-        return drain(pack(maps, [chart.triangles for chart in charts])).coverage
+        return drain(pack(maps, [chart.triangles for chart in charts], roughly=True)).coverage
 
     def necks(self, cut: np.ndarray, images: MirrorImages | None) -> Iterator[np.ndarray]:
         """Edges (e,) bool across necks of the pieces that a cut (e,) bool leaves; images: see `parting.parted`."""

@@ -17,8 +17,8 @@ from omt_uv.solver.progress import drain
 FAN = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
 
 
-def pack(*arguments):
-    return drain(pack_square.pack(*arguments))
+def pack(*arguments, **options):
+    return drain(pack_square.pack(*arguments, **options))
 
 
 def corner(width, height, angle=0.0):
@@ -96,6 +96,24 @@ def test_other_orders_make_room_where_the_first_ones_do_not(monkeypatch):
     fewer = np.array([pack(bars(seed), faces).coverage for seed in (0, 1, 5, 7)])
     # What fits by chance leads elsewhere, and may end a little lower.
     assert (more >= fewer - 0.002).all() and more.mean() > fewer.mean() + 0.003
+
+
+def test_roughly_packed_islands_are_apart_and_fill_less(monkeypatch):
+    """It ends where the finer raster begins."""
+    faces, rasters, rasterised = [np.array([[0, 1, 2], [0, 2, 3]])] * 14, set(), pack_square._rasterised
+
+    def kept(task, scale):
+        rasters.add(task.raster)
+        return rasterised(task, scale)
+
+    monkeypatch.setattr(pack_square, "_rasterised", kept)
+    rough = pack(bars(0), faces, roughly=True)
+    assert rasters == {pack_square.COARSE}
+    assert 0.5 * pack(bars(0), faces).coverage < rough.coverage < pack(bars(0), faces).coverage
+    assert rasters == {pack_square.COARSE, pack_square.FINE}
+    low, high = (np.array([f(p, axis=0) for p in rough.islands]) for f in (np.min, np.max))
+    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
+    assert gap[~np.eye(14, dtype=bool)].min() >= 4 / 1024 - 1e-9
 
 
 def test_many_slim_islands_fill_the_square():
