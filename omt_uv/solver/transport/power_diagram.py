@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import TransportError
 from ..mesh.geometry import as_complex, as_points, dot2, in_parts
 from ..mesh.topology import next_halfedge
 from .convex_domain import Domain, segment_integrals
@@ -72,7 +73,7 @@ def power_diagram(
 
     Raises
     ------
-    TransportError : the sites cannot be triangulated
+    TransportError : the sites cannot be triangulated, or coincide
     """
     if dual is None:
         dual = by_hull(sites, site_weights)
@@ -121,6 +122,9 @@ def _whole_sides(z, centre, dual: RegularTriangulation, h) -> tuple[np.ndarray, 
     g, tail = dual.twin[h], dual.triangles.ravel()
     i, j, p, q = tail[h], tail[g], centre[g // 3], centre[h // 3]
     apart = z[j] - z[i]
+    # By rounding a triangle of sites that nearly coincide is turned over, and shares an edge from a site to itself.
+    if not apart.all():
+        raise TransportError("Sites coincide")
     length = (apart.conj() * (q - p)).imag / np.sqrt((apart * apart.conj()).real)
     return i, j, np.maximum(length, 0), segment_integrals(as_points(p), as_points(q))
 

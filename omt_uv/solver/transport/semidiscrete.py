@@ -115,12 +115,15 @@ class PlanarDual:
         return power_diagram(self.sites, site_weights, self.domain)
 
     def near(self, site_weights: np.ndarray, cells: PowerDiagram) -> PowerDiagram | None:
-        """The diagram of site weights (n,) near another one; None if a cell has certainly vanished."""
+        """The diagram of site weights (n,) near another one; None if a cell has vanished, or there is no diagram."""
         dual, hidden = by_flips(cells.dual, self.sites, site_weights)
         if hidden:
             return None
         if dual is None:
-            return self.anew(site_weights)
+            try:
+                return self.anew(site_weights)
+            except TransportError:
+                return None
         self.diagrams, self._flipped = self.diagrams + 1, True
         self.flips += dual.flips
         return power_diagram(self.sites, site_weights, self.domain, dual)

@@ -1,8 +1,11 @@
 """Power diagrams: exact sums, and what they do not depend on."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
+from omt_uv.solver.errors import TransportError
 from omt_uv.solver.transport.convex_domain import Disk, Rectangle
 from omt_uv.solver.transport.power_diagram import power_diagram
 from omt_uv.solver.transport.regular_triangulation import by_hull
@@ -84,3 +87,13 @@ def test_a_cell_that_weighs_more_than_all_has_the_whole_domain(domain, heavy):
     assert found.area[heavy] == pytest.approx(even.area.sum()) and np.delete(found.area, heavy) == pytest.approx(0)
     assert found.moment[heavy] == pytest.approx(even.moment.sum(axis=0), abs=1e-12)
     assert found.second[heavy] == pytest.approx(even.second.sum())
+
+
+@pytest.mark.parametrize("seed", range(20, 60))
+def test_sites_that_nearly_coincide_have_areas_or_are_told(seed):
+    """By rounding their triangles may be turned over; the areas of cells were no numbers then."""
+    rng = np.random.default_rng(seed)
+    apart, near = rng.uniform(-0.6, 0.6, (40, 2)), [0.5, 0.3] + 1e-6 * rng.normal(size=(60, 2))
+    with np.errstate(all="raise"), contextlib.suppress(TransportError):
+        cells = power_diagram(np.concatenate([apart, near]), np.zeros(100), Disk())
+        assert np.isfinite(cells.area).all() and cells.area.sum() == pytest.approx(np.pi)
