@@ -8,6 +8,12 @@ import pytest
 
 from benchmarks import run
 from benchmarks.part import BOUNDARIES
+from omt_uv.solver.maps.untangle import count_folds, map_energy
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.initial_map import HOPELESS, coarse_initial_map
+from omt_uv.solver.parameterization.polygon_disk import DiskMesh
+from omt_uv.solver.progress import RunLog, drain
 
 
 def test_every_part_says_what_it_shows():
@@ -64,3 +70,23 @@ def test_bodies_of_limbs_are_closed_but_for_holes_of_the_skin():
         assert len(F) >= 2000 and F.max() == len(V) - 1
         edges, uses = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
         assert (uses <= 2).all() and (uses == 1).mean() < 0.02
+
+
+def test_a_surface_that_no_sphere_has_is_left_out_by_its_reason(capsys):
+    args, (part,) = run.parse(["sphere", "--models", "cone", "torus"])
+    rows = part.table(args).rows
+    assert [row[0] for row in rows] == ["cone", "torus"]
+    assert all("left out: " in row[-1] for row in rows) and rows[0][-1] != rows[1][-1]
+
+
+def test_a_coarse_mesh_without_an_embedding_in_double_precision_is_freed_by_a_coarser_one():
+    """Arms hang on their circles, and every ring of a mean value map is a share of the one before."""
+    from benchmarks.parts import pace
+
+    V, F = pace.limb_body("octopus", 40_000)
+    disk = DiskMesh(V, F, face_areas(V, F), boundary_loops(F)[0])
+    assert map_energy(disk.embedded, V, F) > 1e15
+    shown = []
+    found = drain(coarse_initial_map(disk, 0.0, RunLog()), lambda progress: shown.append(progress.fraction))
+    assert found.freed and count_folds(found.uv, F) == 0 and map_energy(found.uv, V, F) < HOPELESS
+    assert (np.diff(shown) >= -1e-12).all() and len(np.unique(shown)) > 20

@@ -13,8 +13,9 @@ __getattr__, __all__ = lazy(
     chart_map="ChartMap map_chart",
     chart_indices="ChartPins CornerPins clear_of_pins",
     convexity="keep_convex",
-    initial_map="DiskMesh InitialChartMap",
+    initial_map="InitialChartMap",
     options="MapOptions UnwrapOptions",
+    polygon_disk="DiskMesh",
     shear_bound="BoundedShear bound_shear",
     unwrap="SurfaceMap",
 )

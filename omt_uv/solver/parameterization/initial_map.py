@@ -7,32 +7,30 @@ do. Coarsening goes on until the chart is small.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.density import density_of_vertices
 from ..canonical.embeddings import evened_sites, mean_value_sites
-from ..conformal.boundary_first import FlatDisk, boundary_first
 from ..errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from ..freed_memory import give_back_of
-from ..linalg.nested_dissection import mesh_order
 from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import energy_in_turn, polygon_elements
 from ..maps.tutte import evened_tutte
 from ..maps.untangle import is_one_to_one, map_energy
-from ..mesh.geometry import face_areas, halfedge_lengths
+from ..mesh.geometry import halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES, SQUEEZED, UNSQUEEZED, is_squeezed
-from ..refinement.initial_maps import is_crowded, is_far
+from ..refinement.initial_maps import is_crowded
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed_uv
-from ..transport.convex_domain import Disk, Domain, Rectangle
+from ..transport.convex_domain import Domain
+from .polygon_disk import DiskMesh
 
 if TYPE_CHECKING:
     from ..conformal.disk_map import ConformalMap
@@ -44,6 +42,8 @@ TRANSPORT = (0.4, 0.6)
 COARSENING = (0.0, 0.3)
 COARSE_MAP = (0.3, 0.2)
 COARSE_REFINEMENT = (0.5, 0.3)
+FREED_BY_COARSER = (0.0, 0.7)
+FREED_REFINEMENT = (0.7, 0.3)
 RETURN = (0.8, 0.1)
 SMOOTHING = (0.9, 0.1)
 # Sites closer than this share of the domain are lost on the paraboloid, where their distance counts squared.
@@ -59,6 +59,8 @@ EMBEDDED = 200_000
 # That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
 COARSER = 8
 COARSE_ENOUGH = 0.25
+# A mesh of this many vertices is no longer coarsened, even where it has no embedding in double precision.
+COARSEST = 50
 # Where the target is far from the surface's areas, coarser meshes say less: smaller steps, and more vertices at once.
 COARSER_FAR = 5
 COARSE_ENOUGH_FAR = 0.4
@@ -92,75 +94,6 @@ MOST_SHEAR = 3.0
 
 
 @dataclass(frozen=True)
-class DiskMesh:
-    """A disk that is to be mapped, and to what.
-
-    Attributes
-    ----------
-    vertices (n,3), triangles (m,3) : in a unit box, with one boundary loop
-    target (m,) : areas of the triangles in the map
-    loop (b,) : the boundary
-    boundary : "free", "disk", "square" or "rectangle"
-    corners (4,) : boundary vertices that go into the corners of a square or rectangle; None in another boundary
-    region (m,) : weights in [0, 1] of a region whose share is to be exact, or None
-    polygons (m,) : of every triangle, or None where each is its own
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    target: np.ndarray
-    loop: np.ndarray
-    boundary: str = "free"
-    corners: np.ndarray | None = None
-    region: np.ndarray | None = None
-    polygons: np.ndarray | None = None
-    aspect: float = 1.0
-
-    @property
-    def domain(self) -> Domain:
-        """Where the transport goes: the rectangle if the map is to fill one, the disk otherwise."""
-        root = np.sqrt(self.aspect)
-        return Disk() if self.corners is None else Rectangle(float(1 / root), float(root))
-
-    @cached_property
-    def embedded(self) -> np.ndarray:
-        """A mean value map (n,2) to the unit disk."""
-        return mean_value_sites(self.vertices, self.triangles, self.loop, None, Disk(), self.order)
-
-    @cached_property
-    def order(self) -> np.ndarray:
-        """In which vertices (n,) are eliminated."""
-        return mesh_order(self.vertices, self.triangles)
-
-    @cached_property
-    def is_far(self) -> bool:
-        """Whether the target is far from the areas of the triangles."""
-        return is_far(self.target, face_areas(self.vertices, self.triangles))
-
-    @cached_property
-    def flat(self) -> FlatDisk | None:
-        """The disk flattened with the boundary as it comes; None where double precision has no such map."""
-        try:
-            return boundary_first(self.vertices, self.triangles, self.loop, self.order)
-        except PrecisionError:
-            return None
-
-    @cached_property
-    def spread(self) -> float:
-        """Mean square of the log scale of the flat disk; about as much shear energy is left where areas are exact."""
-        mass = np.bincount(self.triangles.ravel(), np.repeat(self.target / 3, 3), len(self.vertices))
-        return np.inf if self.flat is None else self.flat.spread(mass)
-
-    @cached_property
-    def bent(self) -> np.ndarray | None:
-        """The flat disk (n,2), bent until it does not cover itself; None where double precision has no such map."""
-        with suppress(PrecisionError):
-            if self.flat is not None:
-                return self.flat.bent_until(lambda uv: is_one_to_one(uv, self.triangles, self.loop))
-        return None
-
-
-@dataclass(frozen=True)
 class InitialChartMap:
     """The map from which the refinement of a chart starts.
 
@@ -171,6 +104,7 @@ class InitialChartMap:
     warm : the map comes from a refined one, and is smooth; prolonged : it comes from a coarser mesh
     multiplier : of that, see `refine.Refinement`
     apart : it is known to cover no place twice
+    freed : it has the room that its faces need, but not their areas: see `polygon_disk.DiskMesh`, buried
     """
 
     uv: np.ndarray
@@ -180,6 +114,7 @@ class InitialChartMap:
     prolonged: bool = False
     multiplier: float = 0.0
     apart: bool = False
+    freed: bool = False
 
 
 def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
@@ -243,9 +178,8 @@ def _coarse_initial_map(
         return None  # what returned to the boundary would lie on a chord
     corners = None if disk.corners is None else np.searchsorted(coarse.kept, disk.corners)
     points = vertices[coarse.kept]
-    coarse_disk = DiskMesh(
-        points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region, aspect=disk.aspect
-    )
+    parts = points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region
+    coarse_disk = DiskMesh(*parts, aspect=disk.aspect, buried=disk.buried)
     found = None
     if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
         coarser = coarse_initial_map(coarse_disk, balance, log, None if flat is None else flat[coarse.kept], draft)
@@ -254,13 +188,12 @@ def _coarse_initial_map(
         found = _draft_start(coarse_disk, flat[coarse.kept], log)
     elif found is None:
         found = yield from part_of(direct_initial_map(coarse_disk, log), *COARSE_MAP)
+    quality = "freed" if disk.buried or found.freed else "sketch" if draft else "rough" if far else "relaxed"
     with log.timed("coarse refinement"):
-        refined = yield from part_of(
-            _coarse_refined(coarse_disk, found, balance, "sketch" if draft else "rough" if far else "relaxed"),
-            *COARSE_REFINEMENT,
-        )
+        way = _coarse_or_coarser_refined(coarse_disk, found, balance, quality, log)
+        found, refined = yield from part_of(way, *COARSE_REFINEMENT)
     log.warnings += refined.warnings
-    stages = found.conformal, found.cells, far, True, refined.multiplier
+    stages = found.conformal, found.cells, far, True, refined.multiplier, False, quality == "freed" or found.freed
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
         del coarse, coarse_disk, points, found, refined  # what leads back takes the memory of ten maps
@@ -273,6 +206,24 @@ def _coarse_initial_map(
         if start is not None and map_energy(start, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(start)
     return InitialChartMap(uv, *stages)
+
+
+def _coarse_or_coarser_refined(
+    disk: DiskMesh, initial: InitialChartMap, balance: float, quality: str, log: RunLog
+) -> Steps[tuple[InitialChartMap, Refinement]]:
+    """The refined map of a coarse mesh, and what it started from: of what double precision has no embedding, as of a
+    body that hangs on a small hole, a still coarser mesh, which has one."""
+    try:
+        return initial, (yield from _coarse_refined(disk, initial, balance, quality))
+    except (FoldedUVError, PrecisionError):
+        if len(disk.vertices) <= COARSEST:
+            raise
+        way = coarse_initial_map(replace(disk, buried=True), balance, log)
+        found = yield from part_of(way, *FREED_BY_COARSER)
+        if found is None:
+            raise
+    refined = _coarse_refined(disk, found, balance, "freed")
+    return found, (yield from part_of(refined, *FREED_REFINEMENT))
 
 
 def _even_start(disk: DiskMesh, flat: np.ndarray) -> np.ndarray | None:

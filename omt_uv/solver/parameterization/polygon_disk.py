@@ -6,16 +6,25 @@ triangles instead of slivers. Polygons that are not convex stay as they are.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from ..canonical.embeddings import mean_value_sites
+from ..conformal.boundary_first import FlatDisk, boundary_first
+from ..errors import PrecisionError
+from ..linalg.nested_dissection import mesh_order
 from ..maps.polygon_elements import polygon_mesh
+from ..maps.untangle import is_one_to_one
 from ..mesh.charts import Chart
 from ..mesh.geometry import cross2, cross3, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_fans
 from ..mesh.topology import boundary_loops, distinct
 from ..quads.diagonals import shorter_diagonals
+from ..refinement.initial_maps import is_far
+from ..transport.convex_domain import Disk, Domain, Rectangle
 
 # Triangles of a polygon that is cut by its ears, at most: that takes the square of them.
 MOST_TRIANGLES = 500
@@ -34,6 +43,77 @@ class PolygonDisk:
     vertices: np.ndarray
     triangles: np.ndarray
     polygons: np.ndarray
+
+
+@dataclass(frozen=True)
+class DiskMesh:
+    """A disk that is to be mapped, and to what.
+
+    Attributes
+    ----------
+    vertices (n,3), triangles (m,3) : in a unit box, with one boundary loop
+    target (m,) : areas of the triangles in the map
+    loop (b,) : the boundary
+    boundary : "free", "disk", "square" or "rectangle"
+    corners (4,) : boundary vertices that go into the corners of a square or rectangle; None in another boundary
+    region (m,) : weights in [0, 1] of a region whose share is to be exact, or None
+    polygons (m,) : of every triangle, or None where each is its own
+    buried : double precision has no embedding of it; maps of coarser meshes shall free its faces first
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    target: np.ndarray
+    loop: np.ndarray
+    boundary: str = "free"
+    corners: np.ndarray | None = None
+    region: np.ndarray | None = None
+    polygons: np.ndarray | None = None
+    aspect: float = 1.0
+    buried: bool = False
+
+    @property
+    def domain(self) -> Domain:
+        """Where the transport goes: the rectangle if the map is to fill one, the disk otherwise."""
+        root = np.sqrt(self.aspect)
+        return Disk() if self.corners is None else Rectangle(float(1 / root), float(root))
+
+    @cached_property
+    def embedded(self) -> np.ndarray:
+        """A mean value map (n,2) to the unit disk."""
+        return mean_value_sites(self.vertices, self.triangles, self.loop, None, Disk(), self.order)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """In which vertices (n,) are eliminated."""
+        return mesh_order(self.vertices, self.triangles)
+
+    @cached_property
+    def is_far(self) -> bool:
+        """Whether the target is far from the areas of the triangles."""
+        return is_far(self.target, face_areas(self.vertices, self.triangles))
+
+    @cached_property
+    def flat(self) -> FlatDisk | None:
+        """The disk flattened with the boundary as it comes; None where double precision has no such map."""
+        try:
+            return boundary_first(self.vertices, self.triangles, self.loop, self.order)
+        except PrecisionError:
+            return None
+
+    @cached_property
+    def spread(self) -> float:
+        """Mean square of the log scale of the flat disk; about as much shear energy is left where areas are exact."""
+        mass = np.bincount(self.triangles.ravel(), np.repeat(self.target / 3, 3), len(self.vertices))
+        return np.inf if self.flat is None else self.flat.spread(mass)
+
+    @cached_property
+    def bent(self) -> np.ndarray | None:
+        """The flat disk (n,2), bent until it does not cover itself; None where double precision has no such map."""
+        with suppress(PrecisionError):
+            if self.flat is not None:
+                return self.flat.bent_until(lambda uv: is_one_to_one(uv, self.triangles, self.loop))
+        return None
 
 
 def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:

@@ -147,6 +147,16 @@ QUALITIES = {
     "relaxed": Quality(
         area_error=0.1, area_weights=(30.0,), greatest_weight=1e4, max_steps=80, tolerance=3e-2, loose_tolerance=1e-2
     ),
+    # For that of a mesh which is squeezed to nothing: room for every face. While more than half of the area is in the
+    # wrong place, some faces have none.
+    "freed": Quality(
+        area_error=1.0,
+        area_weights=(SQUEEZED_WEIGHT,),
+        greatest_weight=30.0,
+        max_steps=120,
+        tolerance=1e-3,
+        loose_tolerance=1e-3,
+    ),
     "rough": Quality(area_error=0.03, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=80, tolerance=1e-2),
     # For that of a draft. Sweeps of the fine mesh do what is left.
     "sketch": Quality(

@@ -15,6 +15,7 @@ from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import initial_map as initial_maps
+from omt_uv.solver.parameterization import polygon_disk
 from omt_uv.solver.parameterization.initial_map import (
     DiskMesh,
     coarse_initial_map,
@@ -123,13 +124,13 @@ def test_large_meshes_are_embedded_once_they_are_coarse(boundary, monkeypatch):
     """What comes of that is as good a map."""
     V, F = meshes.head(96)
     surface, options = triangle_surface(V, F), UnwrapOptions(boundary)
-    sizes, embedded = [], initial_maps.mean_value_sites
+    sizes, embedded = [], polygon_disk.mean_value_sites
 
     def seen(vertices, *rest):
         sizes.append(len(vertices))
         return embedded(vertices, *rest)
 
-    monkeypatch.setattr(initial_maps, "mean_value_sites", seen)
+    monkeypatch.setattr(polygon_disk, "mean_value_sites", seen)
     (whole,) = drain(unwrap(surface, options=options)).maps
     assert max(sizes) == len(V)
     sizes.clear()

@@ -181,7 +181,7 @@ def test_a_stage_is_the_last_from_its_bounds_on(quality):
     of = QUALITIES[quality]
     error, weight = of.area_error, of.greatest_weight
     # Both bounds are within, and with shear in the balance every stage is enough.
-    for given, asked in (((error, 0.0), True), ((np.nextafter(error, 1), 0.0), False), ((2 * error, weight), True),
+    for given, asked in (((error, 0.0), True), ((np.nextafter(error, np.inf), 0.0), False), ((2 * error, weight), True),
                          ((2 * error, np.nextafter(weight, 0)), False), ((0.0, 0.0), True)):  # fmt: skip
         assert bool(rules.is_enough(of, 0.0, *given)) == asked
         assert rules.is_enough(of, 0.5, *given)
