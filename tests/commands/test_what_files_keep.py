@@ -1,0 +1,75 @@
+"""What every command leaves of a .blend that holds much: all of it, to the last value, but what the command is for."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+import command_runs
+import pytest
+import scenes
+import whole_file
+
+# UVs are those of the active layer.
+UVS = ("meshes/?/attributes/UVMap", "meshes/?/uv_layers/1/*")
+HALVES = ("meshes/Halves/attributes/UVMap", "meshes/Halves/uv_layers/0/*")
+SEAMS = ("meshes/*/edges/*/use_seam", "meshes/*/attributes/*uv_seam")
+PLACES = ("meshes/*/attributes/position", "meshes/*/vertices/*/co", "meshes/*/vertices/*/normal",
+          "meshes/*/vertices/*/undeformed_co", "meshes/*/polygons/*/normal", "meshes/*/polygons/*/center",
+          "meshes/*/polygons/*/area", "objects/*/bound_box", "objects/*/dimensions")  # fmt: skip
+BODIES = "--object A --object B"
+# A new object and its mesh, and what holds them.
+NEW = ("*/A_*", "collections/*/objects*", "collections/*/collection_objects*", "scenes/*/objects*", "scenes/*/objects*")
+# Command, words besides, and what it may change then, as patterns of paths.
+RUNS: list[tuple[str, str, tuple[str, ...]]] = [
+    ("unwrap", BODIES, UVS),
+    ("unwrap", f"{BODIES} --mark-seams --seams charts", (*UVS, *SEAMS)),
+    ("unwrap", f"{BODIES} --uv-layer other", ("meshes/?/attributes/other", "meshes/?/uv_layers/0/*", "*/1/active")),
+    ("refine", BODIES, UVS),
+    ("magnify", BODIES, UVS),
+    ("sphere", BODIES, UVS),
+    ("queue", BODIES, UVS),
+    ("stack", "", (*UVS, *HALVES)),
+    ("symmetrize", "--object Halves", HALVES),
+    ("rectify", "--object Halves", HALVES),
+    ("seams", f"{BODIES} --max-shear 0", SEAMS),
+    ("weights", f"{BODIES} --group second", ("meshes/*/vertices/*/groups*",)),
+    ("measure", BODIES, ("meshes/?/attributes/OMT*",)),
+    ("partition", BODIES, ("meshes/?/attributes/.sculpt_face_set",)),
+    ("flow", "--object A", PLACES),
+    ("remesh", "--object A", NEW),
+]
+
+
+@pytest.fixture(scope="module")
+def rich(package, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rich")
+    scenes.open_empty()
+    whole_file.make()
+    bpy.data.images["Picture"].save(filepath=str(folder / "image.png"))
+    (folder / "handles.json").write_text(json.dumps([{"vertices": [0], "move": [0, 0, 0.1]}]))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "in.blend"))
+    return folder
+
+
+def opened(path):
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return whole_file.told()
+
+
+@pytest.mark.parametrize(("name", "more", "may"), RUNS, ids=[f"{name} {more}" for name, more, _ in RUNS])
+def test_all_that_a_command_is_not_for_stays_to_the_last_value(run, rich, name, more, may):
+    before = opened(rich / "in.blend")
+    words = command_runs.words(name, rich)
+    for option in {"--report", "--preview"} & set(map(str, words)):
+        # It takes long to compare what remeshing has made.
+        del words[words.index(option) : words.index(option) + 2]
+    status, _, err = run(*words, *more.split())
+    assert status == 0, err
+    after = opened(rich / "out.blend")
+    found = whole_file.changed(before, after, may)
+    assert not found, found[:40]
+    # Every object that was named has changed, or one has come of it.
+    names = " ".join(path.split("/")[1][:1] for path in whole_file.changed(before, after))
+    assert all(word[0] in names for word in more.split("--object ")[1:]), names
