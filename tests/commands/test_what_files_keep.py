@@ -58,14 +58,18 @@ def opened(path):
     return whole_file.told()
 
 
+def words_of(name, folder):
+    """A call of a command that writes no report and no picture: it takes long to compare what remeshing has made."""
+    words = command_runs.words(name, folder)
+    for option in {"--report", "--preview"} & set(map(str, words)):
+        del words[words.index(option) : words.index(option) + 2]
+    return words
+
+
 @pytest.mark.parametrize(("name", "more", "may"), RUNS, ids=[f"{name} {more}" for name, more, _ in RUNS])
 def test_all_that_a_command_is_not_for_stays_to_the_last_value(run, rich, name, more, may):
     before = opened(rich / "in.blend")
-    words = command_runs.words(name, rich)
-    for option in {"--report", "--preview"} & set(map(str, words)):
-        # It takes long to compare what remeshing has made.
-        del words[words.index(option) : words.index(option) + 2]
-    status, _, err = run(*words, *more.split())
+    status, _, err = run(*words_of(name, rich), *more.split())
     assert status == 0, err
     after = opened(rich / "out.blend")
     found = whole_file.changed(before, after, may)
@@ -73,3 +77,22 @@ def test_all_that_a_command_is_not_for_stays_to_the_last_value(run, rich, name, 
     # Every object that was named has changed, or one has come of it.
     names = " ".join(path.split("/")[1][:1] for path in whole_file.changed(before, after))
     assert all(word[0] in names for word in more.split("--object ")[1:]), names
+
+
+# What is done to every object by itself, whatever others there are.
+ALONE = [run for run in RUNS if run[0] in ("weights", "seams", "partition", "sphere", "measure")]
+
+
+@pytest.mark.parametrize(("name", "more"), [run[:2] for run in ALONE], ids=[run[0] for run in ALONE])
+def test_an_object_gets_among_others_what_it_gets_alone(run, rich, name, more):
+    found = []
+    for words in (more, *(more.replace(f"--object {other}", "") for other in "AB")):
+        status, _, err = run(*words_of(name, rich), *words.split())
+        assert status == 0, err
+        found.append(opened(rich / "out.blend"))
+    both, second, first = found
+    for letter, alone in (("A", first), ("B", second)):
+        mine = [{path: value for path, value in told.items() if path.split("/")[1] == letter} for told in (both, alone)]
+        assert len(mine[0]) > 1000
+        found = whole_file.changed(*mine, ("scenes/*",))
+        assert not found, (letter, found[:40])
