@@ -33,7 +33,7 @@ def add(commands) -> None:
         "--attributes",
         type=Path,
         metavar="OUT.blend",
-        help="write area ratio, shear and stretch as attributes of faces",
+        help="write area ratio, shear and stretch as attributes of faces of the mesh, without its modifiers",
     )
     command.add_argument(
         "--beltrami",

@@ -58,9 +58,14 @@ SAME_UV = 1e-4
 
 def evaluated(reading: Reading) -> Reading:
     """The reading of the subdivided mesh with its smoothed UVs, as the renderer has it; itself without a modifier."""
+    return evaluated_polygons(reading)[0]
+
+
+def evaluated_polygons(reading: Reading) -> tuple[Reading, np.ndarray]:
+    """The same, and for each of its polygons that of the cage (q,) which it is a part of."""
     modifier, surface = reading.subdivision, reading.surface
     if modifier is None or not len(surface.corner_vertex):
-        return reading
+        return reading, np.arange(len(reading.faces))
     fine = subdivided_surface(surface, modifier, MOST_QUADS)
     quads, polygon = fine.subdivision.quads, fine.subdivision.polygon
     corner = 4 * np.arange(len(quads))[:, None, None] + HALVES
@@ -76,7 +81,7 @@ def evaluated(reading: Reading) -> Reading:
     uv = None
     if reading.uv is not None:
         uv = _quad_uvs(surface, reading.uv, modifier, fine.levels).reshape(-1, 2)
-    return Reading(subdivided, reading.faces[polygon], uv, None)
+    return Reading(subdivided, reading.faces[polygon], uv, None), polygon
 
 
 def _quad_uvs(surface: Surface, uv: np.ndarray, modifier: SubdivisionModifier, levels: int) -> np.ndarray:

@@ -119,10 +119,21 @@ def test_polygons_are_counted_and_a_subdivided_surface_is_said(run, tmp_path):
     regions = json.loads(run("measure", path, "--regions", "materials", "--json")[1])["regions"]
     assert [row["faces"] for row in regions] == [count, count // 3, count - count // 3]
     (obj,) = bpy.data.objects
-    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 1
     told = json.loads(run("measure", save(tmp_path), "--json")[1])
     assert told["on_subdivided_surface"] is True
     assert "n the subdivided surface" in run("measure", path)[1]
+    # As well as those of regions, whose quads are parts of their polygons.
+    regions = json.loads(run("measure", path, "--regions", "materials", "--json")[1])["regions"]
+    assert [row["faces"] for row in regions] == [4 * count, 4 * (count // 3), 4 * (count - count // 3)]
+    assert regions[0]["shear"] == pytest.approx(told["angle_mean"], rel=1e-6)
+    (bpy.context.view_layer.objects.active,) = bpy.data.objects
+    bpy.ops.object.modifier_apply(modifier="Subdivision")
+    applied = json.loads(run("measure", save(tmp_path), "--regions", "materials", "--json")[1])["regions"]
+    for row, other in zip(regions, applied, strict=True):
+        # Blender may put vertices onto the limit surface.
+        assert row == {key: pytest.approx(x, rel=0.05) if key != "name" else x for key, x in other.items()}
 
 
 def test_compare_tells_what_plain_formulas_give(package, run, tmp_path, monkeypatch):

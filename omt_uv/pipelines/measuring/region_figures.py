@@ -15,6 +15,7 @@ from ...solver.mesh.polygon_areas import polygon_areas
 from ...solver.mesh.topology import halfedges, pair_keys, paired
 from ..distortion import ChosenTriangles, triangles_of
 from ..reading import Reading
+from ..subdivision import evaluated_polygons
 
 # Shear of a face counts up to here: one that is squashed onto a line must not drown the mean of all others.
 MOST_SHEAR = 1e6
@@ -59,13 +60,17 @@ def figures_by_region(
 ) -> list[RegionFigures]:
     """Figures of all chosen polygons together, and of each region.
 
+    Of objects with a Subdivision Surface modifier, the subdivided surface and its UVs are measured, and the quads that
+    a polygon became belong to its regions.
+
     regions : pairs of a name and, for every reading, which polygons (f,) bool belong to it; regions may share polygons
 
     Raises
     ------
     EmptyMeshError : no polygon is chosen, a mesh has no UVs, or a region has no polygon
     """
-    found = triangles_of(readings)
+    fine = [evaluated_polygons(reading) for reading in readings]
+    found = triangles_of([reading for reading, _ in fine])
     octaves, shear = face_distortion(found.positions, found.triangles, found.uv, found.polygons)
     flat = found.uv.reshape(-1, 2)
     measured = _Measured(
@@ -78,7 +83,8 @@ def figures_by_region(
     rows = [_row("all", measured, np.ones(len(found.triangles), bool), texture_size)]
     for name, masks in regions:
         # Polygons are counted over all readings, as `triangles_of` does.
-        inside = np.concatenate([np.asarray(mask, bool) for mask in masks])
+        parts = zip(masks, fine, strict=True)
+        inside = np.concatenate([np.asarray(mask, bool)[polygon] for mask, (_, polygon) in parts])
         if not inside[found.polygons].any():
             raise EmptyMeshError(f"The region {name!r} has no face", remedy="Choose another, or paint it")
         rows.append(_row(name, measured, inside[found.polygons], texture_size))
