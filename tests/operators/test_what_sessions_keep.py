@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 import pytest
+import scenes
 import whole_file
 
 # UVs are those of the active layer.
@@ -46,6 +47,7 @@ RUNS: list[tuple[str, str, dict, tuple[str, ...]]] = [
 
 @pytest.fixture(scope="module")
 def rich(package, tmp_path_factory):
+    scenes.open_empty()
     whole_file.make()
     path = tmp_path_factory.mktemp("rich") / "in.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
