@@ -78,6 +78,9 @@ def test_a_preview_and_the_figures_are_those_of_the_file_that_was_written(run, r
     # Of what is magnified the shear is that of a surface with other areas.
     if name in ("unwrap", "refine"):
         check_charts(told["charts"], figures)
+        for chart in told["charts"]:
+            alone = measured(run, rich / "out.blend", ["--object", chart["object"]])
+            assert chart["angle_mean"] == pytest.approx(alone["angle_mean"], rel=1e-4)
 
 
 def check_charts(charts, figures):

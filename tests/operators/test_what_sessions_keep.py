@@ -31,8 +31,7 @@ RUNS: list[tuple[str, str, dict, tuple[str, ...]]] = [
     ("uv.omt_rectify", "H", {}, HALVES),
     ("uv.omt_flow", "A", {"start": (0.5, 0.5), "move": (0.1, 0.0), "radius": 0.5}, UVS),
     ("uv.omt_seams", "AB", {"max_shear": 0.0}, ("meshes/?/edges/*/use_seam", "meshes/?/attributes/*uv_seam")),
-    ("object.omt_weights", "AB", {"kind": "GAUSSIAN", "weight_group": "second"}, ("meshes/?/vertices/*/groups*",
-                                                              "objects/?/vertex_groups/active*")),
+    ("object.omt_weights", "AB", {"kind": "GAUSSIAN", "weight_group": "region"}, ("meshes/?/vertices/*/groups*",)),
     ("mesh.omt_partition", "AB", {"cells": 4, "relax": 0}, ("meshes/?/attributes/.sculpt_face_set",)),
     ("mesh.omt_partition", "AB", {"cells": 4, "relax": 0, "write": "SEAMS"},
      ("meshes/?/edges/*/use_seam", "meshes/?/attributes/*uv_seam")),
@@ -72,6 +71,7 @@ def test_all_that_an_operator_is_not_for_stays_and_undo_gives_back_all(rich, nam
     after = whole_file.told()
     found = whole_file.changed(before, after, may)
     assert not found, found[:40]
+    assert not whole_file.idle(before, after, may)
     touched = " ".join(path.split("/")[1][:1] for path in whole_file.changed(before, after))
     assert not may or all(letter in touched for letter in selected), touched
     if may:

@@ -46,6 +46,12 @@ def changed(before: dict[str, str], after: dict[str, str], may: tuple[str, ...] 
     return [path for path in other if not any(fnmatchcase(path, pattern) for pattern in may)]
 
 
+def idle(before: dict[str, str], after: dict[str, str], may: tuple[str, ...]) -> list[str]:
+    """Patterns that no path fits whose value differs."""
+    paths = changed(before, after)
+    return [pattern for pattern in may if not any(fnmatchcase(path, pattern) for path in paths)]
+
+
 def _walk(struct, path: str, found: dict[str, str], depth: int) -> None:
     for prop in struct.bl_rna.properties:
         name = prop.identifier
