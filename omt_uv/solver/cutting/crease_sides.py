@@ -121,8 +121,6 @@ def hard_borders(
             diagonal = diagonal_pairs(left, positions, factor) if diagonal is None else diagonal
             component = with_quads(component, diagonal[component.gluing_pair])
             sides = hard_sides(component)
-            if sides is None:
-                continue
         if sides is None:
             found[number[component.gluing_pair[cap_borders(component)]]] = True
         elif not _has_clear_net(component):
