@@ -25,6 +25,7 @@ def sized(count, **given):
     """A disk that is known by its number of vertices alone."""
     fixed = {"boundary": "free", "is_far": False, "vertices": np.zeros((count, 3)), "triangles": None, "target": None}
     fixed |= {"loop": np.arange(9), "corners": None, "region": None, "aspect": 1.0, "order": None, "domain": None}
+    fixed |= {"buried": False}
     return SimpleNamespace(**fixed | {"embedded": "embedded", "bent": "bent", "spread": 0.0} | given)
 
 
