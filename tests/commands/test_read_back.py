@@ -10,7 +10,6 @@ import bpy
 import command_runs
 import numpy as np
 import pytest
-import scenes
 import whole_file
 
 BODIES = ["--object", "A", "--object", "B"]
@@ -29,11 +28,7 @@ FORMATS = (".obj", ".ply", ".glb", ".gltf", ".fbx")
 
 @pytest.fixture(scope="module")
 def rich(package, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("rich")
-    scenes.open_empty()
-    whole_file.make()
-    bpy.data.images["Picture"].save(filepath=str(folder / "image.png"))
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "in.blend"))
+    folder = whole_file.save(tmp_path_factory.mktemp("rich"))
     # What every format holds of it: the bodies alone, with one UV map.
     for obj in [obj for obj in bpy.data.objects if obj.name not in ("A", "B")]:
         bpy.data.objects.remove(obj)
@@ -64,7 +59,7 @@ def test_a_preview_and_the_figures_are_those_of_the_file_that_was_written(run, r
     words = command_runs.words(name, rich)
     if name == "remesh":
         # It takes long to compare what was made, and no figure of that is of UVs.
-        del words[words.index("--report") : words.index("--report") + 2]
+        words = command_runs.without(words, "--report")
     status, _, err = run(*words, *(BODIES[:2] if name == "remesh" else BODIES), *more)
     assert status == 0, err
     drawn = (rich / "preview.png").read_bytes()

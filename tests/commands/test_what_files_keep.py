@@ -8,7 +8,6 @@ import bpy
 
 import command_runs
 import pytest
-import scenes
 import whole_file
 
 # UVs are those of the active layer.
@@ -44,12 +43,8 @@ RUNS: list[tuple[str, str, tuple[str, ...]]] = [
 
 @pytest.fixture(scope="module")
 def rich(package, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("rich")
-    scenes.open_empty()
-    whole_file.make()
-    bpy.data.images["Picture"].save(filepath=str(folder / "image.png"))
+    folder = whole_file.save(tmp_path_factory.mktemp("rich"))
     (folder / "handles.json").write_text(json.dumps([{"vertices": [0], "move": [0, 0, 0.1]}]))
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "in.blend"))
     return folder
 
 
@@ -60,10 +55,7 @@ def opened(path):
 
 def words_of(name, folder):
     """A call of a command that writes no report and no picture: it takes long to compare what remeshing has made."""
-    words = command_runs.words(name, folder)
-    for option in {"--report", "--preview"} & set(map(str, words)):
-        del words[words.index(option) : words.index(option) + 2]
-    return words
+    return command_runs.without(command_runs.words(name, folder), "--report", "--preview")
 
 
 @pytest.mark.parametrize(("name", "more", "may"), RUNS, ids=[f"{name} {more}" for name, more, _ in RUNS])

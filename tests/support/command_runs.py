@@ -110,6 +110,14 @@ CALLS = {
 }  # fmt: skip
 
 
+def without(words: list, *options: str) -> list:
+    """The words of a call without options and what stands behind each."""
+    left = list(words)
+    for option in set(options) & set(map(str, words)):
+        del left[left.index(option) : left.index(option) + 2]
+    return left
+
+
 def contents(folder: Path) -> dict[str, bytes | None]:
     """Every file of a folder, and of those in it, with its bytes; folders have none."""
     return {path.relative_to(folder).as_posix(): path.read_bytes() if path.is_file() else None

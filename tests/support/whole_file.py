@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from fnmatch import fnmatchcase
+from pathlib import Path
 
 import bpy
 
@@ -177,3 +178,12 @@ def make() -> list[bpy.types.Object]:
     _halves().location = (0, 0, 4)
     scenes.select(bodies)
     return bodies
+
+
+def save(folder: Path) -> Path:
+    """The same in a file of its own, in.blend of a folder, with what commands ask for besides; the folder."""
+    scenes.open_empty()
+    make()
+    bpy.data.images["Picture"].save(filepath=str(folder / "image.png"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "in.blend"))
+    return folder

@@ -218,8 +218,6 @@ def make_component(
 def with_quads(component: CutComponent, diagonal: np.ndarray) -> CutComponent:
     """A component with quads in the place of the triangles beside diagonals (e,) bool, cut along the shorter ones."""
     rows = np.flatnonzero(diagonal)
-    if not len(rows):
-        return component
     one, other = component.pair[rows].T // 3
     triangles, place = with_shorter_diagonals(component.positions, component.triangles, component.pair[rows])
     pair, cost, polygons = place[component.pair], component.cost.copy(), component.polygons.copy()

@@ -119,8 +119,10 @@ def hard_borders(
         if sides is not None and not as_drawn:
             # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
             diagonal = diagonal_pairs(left, positions, factor) if diagonal is None else diagonal
-            component = with_quads(component, diagonal[component.gluing_pair])
-            sides = hard_sides(component)
+            found_again = diagonal[component.gluing_pair]
+            if found_again.any():
+                component = with_quads(component, found_again)
+                sides = hard_sides(component)
         if sides is None:
             found[number[component.gluing_pair[cap_borders(component)]]] = True
         elif not _has_clear_net(component):

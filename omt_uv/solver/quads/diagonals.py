@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..mesh.geometry import cross3, lengths, part_by_part
+from ..mesh.geometry import bounds, cross3, lengths, part_by_part
 from ..mesh.polygon_areas import quads
 from ..mesh.surface import Surface
 from ..mesh.topology import distinct, pair_keys
@@ -69,7 +69,7 @@ def cut_along_shorter(surface: Surface) -> Surface:
     points = surface.positions[used]
     if not len(used) or not np.isfinite(points).all():
         return surface
-    low, high = points.min(axis=0) / 2, points.max(axis=0) / 2
+    low, high = (corner / 2 for corner in bounds(points))
     points = (points / 2 - low) / max(float((high - low).max()), float(np.finfo(float).tiny))
     number = np.full(len(surface.positions), -1)
     number[used] = np.arange(len(used))

@@ -60,12 +60,13 @@ def with_shorter_diagonals(
 
     positions : (n,3), see `quad_diagonals`; diagonal : (q,2) halfedges of the diagonals
     """
-    turned = diagonal[longer_diagonals(positions, _quads(triangles, diagonal), triangles)]
+    quads = _quads(triangles, diagonal)
+    longer = longer_diagonals(positions, quads, triangles)
+    turned, quads = diagonal[longer], quads[longer]
     now, place = triangles.copy(), np.arange(triangles.size)
     own, beyond = (np.stack([h, next_halfedge(h), previous_halfedge(h)]) for h in turned.T)
     one, other = 3 * (turned // 3).T
-    quad = _quads(triangles, turned)
-    now[one // 3], now[other // 3] = quad[:, [3, 0, 1]], quad[:, [1, 2, 3]]
+    now[one // 3], now[other // 3] = quads[:, [3, 0, 1]], quads[:, [1, 2, 3]]
     place[own[2]], place[beyond[1]], place[own[0]] = one, one + 1, one + 2
     place[beyond[2]], place[own[1]], place[beyond[0]] = other, other + 1, other + 2
     return now, place

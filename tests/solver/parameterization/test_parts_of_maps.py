@@ -74,6 +74,17 @@ def round_of(areas, means, pressing=None, searched=None, memory=None, charts=Non
     return shear_search.Round(charts, maps, cuts, memory or {}, areas, means, pressing, bound, searched)
 
 
+def cutting(asked, new):
+    """In the place of `_cut_anew`: tells what is asked and gives a new round."""
+
+    def cut_anew(search, before, what, map_charts, early):
+        asked.append(what)
+        return new
+        yield
+
+    return cut_anew
+
+
 def test_what_is_missing_is_the_excess_times_the_area_of_what_is_searched():
     one = round_of([1, 2, 5], [1.3, 1.55, 1.95], searched=[1])
     np.testing.assert_allclose(one.missing, [0, 2 * 0.2, 0])
@@ -332,12 +343,7 @@ def test_what_misses_its_bound_comes_apart_along_all_creases_where_that_helps(af
     last, new = round_of([1, 1, 1], [1.5, 1.2, 1.5]), None if after is None else round_of([1, 1, 1], [after, 1.2, 1.5])
     asked = []
 
-    def cut_anew(search, before, what, map_charts, early):
-        asked.append(what)
-        return new
-        yield
-
-    monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
+    monkeypatch.setattr(shear_bound, "_cut_anew", cutting(asked, new))
     monkeypatch.setattr(shear_bound.Round, "kept", lambda self, chosen: ("kept", *chosen))
     search = SimpleNamespace(first_spread=lambda: "spread")
     found = drain(shear_bound._along_all_creases(search, last, None, EarlyEnd()))
@@ -433,12 +439,7 @@ def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, 
     last.merged = lambda search, other, of, stay: stay
     asked = []
 
-    def cut_anew(search, before, what, map_charts, early):
-        asked.append(what)
-        return new
-        yield
-
-    monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
+    monkeypatch.setattr(shear_bound, "_cut_anew", cutting(asked, new))
     search = SimpleNamespace(count=3, first_spread=lambda: np.full(3, 0.2), with_images=lambda charts, chosen: chosen)
     found = drain(shear_bound._straightened(search, last, None, EarlyEnd()))
     assert found is last if not any(taken) else (~found).tolist() == taken
