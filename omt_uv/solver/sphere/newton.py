@@ -96,7 +96,7 @@ class SphereProblem:
     """What Newton minimises: polygons whose ratio is that of their projections, and the area weight.
 
     target (p,): spherical areas, summing to 4 pi; ratio (p,): theirs over those of the surface; symmetry: that of the
-    maps, which every step keeps
+    maps, which every step keeps; uneven: the energy has it not, since some polygons are cut otherwise than their images
     """
 
     faces: Elements
@@ -105,6 +105,7 @@ class SphereProblem:
     assembly: Assembly
     area_weight: float
     symmetry: SphereSymmetry | None = None
+    uneven: bool = False
 
     def spherical_areas(self, positions: np.ndarray) -> np.ndarray:
         """Areas (p,) of the polygons on the sphere, by the triangulation given."""
@@ -145,7 +146,9 @@ class SphereProblem:
         local = derivatives_of(self.faces, a, b, self.area_weight, pressure)
         whole = None if self.faces.polygon is None else area_forms_of(self.faces, a, b, self.area_weight)
         axes = tangents(positions)
-        direction, slope = newton_direction(self.faces, self.assembly, positions, axes, face, local, area=whole)
+        even = self.symmetry if self.uneven else None
+        given = self.faces, self.assembly, positions, face, local
+        direction, slope = newton_direction(*given, area=whole, symmetry=even)
         moved = np.einsum("na,nad->nd", direction, axes)
         if self.symmetry is not None:
             moved = self.symmetry.averaged(moved)
@@ -167,23 +170,25 @@ def newton_direction(
     faces: Elements,
     assembly: Assembly,
     positions: np.ndarray,
-    axes: np.ndarray,
     face: ProjectedFaces,
     local: FaceDerivatives,
     fixed: np.ndarray | None = None,
     area: np.ndarray | None = None,
+    symmetry: SphereSymmetry | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Step (n,2) along the tangents (n,2,3), 0 for fixed vertices (n,) bool, and the energy's slope along it.
+    """Step (n,2) along the `tangents`, 0 for fixed vertices (n,) bool, and the energy's slope along it.
 
+    symmetry: of a map whose energy has none; the step is the symmetric one that is best for it
     area (m,3) complex: the parts that triangles have in the rows of their polygons' areas, see `energy.area_forms`
     """
-    n, triangles = len(positions), faces.triangles
+    n, triangles, axes = len(positions), faces.triangles, tangents(positions)
     # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).
     turn = np.matmul(face.axes[:, None], axes[triangles].swapaxes(2, 3))
     rows = _tangential(local.rows, face, turn)
     corner = np.matmul(local.gradient[:, None], face.mixing).reshape(-1, 3).view(float).reshape(-1, 3, 2)
     pull = np.matmul(corner, face.axes).reshape(-1, 3)
     gradient = np.column_stack([np.bincount(triangles.ravel(), pull[:, d], n) for d in range(3)])
+    gradient = gradient if symmetry is None else symmetry.averaged(gradient)
     # Moving along a great circle bends inwards: the pull along the radius adds to the Hessian.
     bend = np.maximum(-np.einsum("nd,nd->n", gradient, positions), 0)
     scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
@@ -202,6 +207,7 @@ def newton_direction(
         matrix = assembly.matrix(blocks, diagonal, fours)
         matrix = matrix if rest is None else matrix + rest
     slope = np.einsum("nd,nad->na", gradient, axes).ravel()
+    matrix = matrix if symmetry is None else symmetry.averaged_hessian(matrix, axes)
     step = -Factor(matrix, "natural").solve(slope)
     return step.reshape(n, 2), float(step @ slope)
 

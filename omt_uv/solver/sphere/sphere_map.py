@@ -39,6 +39,9 @@ TRANSPORT = (0.15, 0.25)
 REFINEMENT = (0.4, 0.6)
 # Area error, over that of symmetric quads, that a map of these may have in the triangles that they came as.
 AREA_KEPT = 1.5
+# Up to this share of the triangles that are joined to quads for their mirror images, the areas are those of triangles
+# as they came, in a symmetric map all the same: it has room for these few.
+FEW_JOINED = 0.1
 # Cells may be off by this share of their areas: the refinement that follows starts as well from these.
 START_TOLERANCE = 0.1
 # From coarse to fine, where the transport failed.
@@ -118,7 +121,8 @@ def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMa
     surface, polygons, target = given.surface, given.polygons, given.target
     warnings = list(surface.warnings)
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
-    options = options | {"polygons": joined}
+    few = joined is not None and joined is not polygons and _joined_share(joined, polygons) <= FEW_JOINED
+    options = options | ({"polygons": polygons, "mirrored": joined} if few else {"polygons": joined})
     sites, found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
     refined, flow = None, (yield from part_of(_flow(found, surface, target, method), *TRANSPORT))
     if found is not None and flow is not None and method == MOSER:
@@ -129,7 +133,7 @@ def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMa
     if refined is None:
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *MULTILEVEL)
         refined = yield from _refined(surface, start, target, options)
-    if joined is not polygons and not _as_given(refined.positions, surface, target, refined.area_error):
+    if not few and joined is not polygons and not _as_given(refined.positions, surface, target, refined.area_error):
         refined = yield from _refined(surface, refined.positions, target, options | {"polygons": polygons})
     if options["balance"] == 0 and refined.area_error > QUALITIES[options["quality"]].area_error:
         warnings.append(_area_warning(refined.positions, surface.triangles, target, polygons))
@@ -144,6 +148,12 @@ def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMa
         warnings=tuple(warnings),
         flow=flow,
     )
+
+
+def _joined_share(joined: np.ndarray, polygons: np.ndarray | None) -> float:
+    """Share of the triangles whose polygons (m,) were joined, two by two, from others (m,)."""
+    given = len(joined) if polygons is None else len(np.unique(polygons))
+    return 2 * (given - len(np.unique(joined))) / len(joined)
 
 
 def _check_method(method: str) -> None:
@@ -183,10 +193,12 @@ def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
 
 
 def _as_given(positions: np.ndarray, surface: ClosedSurface, target: np.ndarray, error: float) -> bool:
-    """Whether triangles as they were given, with their targets (m,), have areas not much farther off than quads."""
+    """Whether triangles as they were given, with their targets (m,), have areas not much farther off than quads, in the
+    mean and in their deviation: a few that are off by half say nothing in the mean."""
     share = target / target.sum()
-    off = np.abs(spherical_areas(positions, surface.triangles) / (4 * np.pi) - share).sum()
-    return bool(off <= AREA_KEPT * error and signed_volumes(positions, surface.triangles).min() > 0)
+    off = np.abs(spherical_areas(positions, surface.triangles) / (4 * np.pi * share) - 1)
+    far = max(share @ off, np.sqrt(share @ off**2))
+    return bool(far <= AREA_KEPT * error and signed_volumes(positions, surface.triangles).min() > 0)
 
 
 def _area_warning(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray, polygons: np.ndarray | None) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..mesh.mirror import mirrored_quads
 from ..mesh.spherical_geometry import normalized
@@ -35,6 +36,15 @@ class SphereSymmetry:
             # Reflections are their own inverses.
             total += vectors[image] @ turn
         return total / (1 + len(self.images))
+
+    def averaged_hessian(self, matrix: sp.csc_matrix, axes: np.ndarray) -> sp.csc_matrix:
+        """A Hessian (2n,2n) along tangents (n,2,3) of a symmetric map, in the mean with its images."""
+        n, total = len(axes), matrix.copy()
+        for image, turn in zip(self.images, self.reflections, strict=True):
+            blocks = np.matmul(axes @ turn.T, axes[image].swapaxes(1, 2))
+            carried = sp.bsr_matrix((blocks, image, np.arange(n + 1)), shape=(2 * n, 2 * n)).tocsc()
+            total = total + carried.T @ matrix @ carried
+        return (total / (1 + len(self.images))).tocsc()
 
 
 def symmetric_map(images: np.ndarray, positions: np.ndarray) -> tuple[SphereSymmetry, np.ndarray] | None:

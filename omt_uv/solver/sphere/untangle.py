@@ -70,7 +70,7 @@ def _step(faces: Elements, assembly: Assembly, positions: np.ndarray, fixed, eps
     eps = np.hypot(LEAST_EPS, eps_share * worst)
     value, local = _energy(faces, a, b, eps), _local(faces, a, b, eps)
     axes = tangents(positions)
-    direction, slope = newton_direction(faces, assembly, positions, axes, face, local, fixed)
+    direction, slope = newton_direction(faces, assembly, positions, face, local, fixed)
     share = min(1.0, LONGEST_MOVE / max(float(np.linalg.norm(direction, axis=1).max()), LONGEST_MOVE))
     for _ in range(MAX_HALVINGS):
         trial = retract(positions, axes, share * direction)
