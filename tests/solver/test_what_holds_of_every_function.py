@@ -309,10 +309,10 @@ def shaken(seed):
     with pytest.MonkeyPatch.context() as patch:
         for name in ("patch", "body"):
             patch.setattr(solver_runs, name, functools.partial(_shaken, getattr(solver_runs, name), seed))
-        for cached in (solver_runs._flat, solver_runs._flat_sheet, solver_runs._ball):
+        for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
             cached.cache_clear()
         kept = run_all()
-    for cached in (solver_runs._flat, solver_runs._flat_sheet, solver_runs._ball):
+    for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
         cached.cache_clear()
     return kept
 

@@ -57,7 +57,7 @@ def triangles(mesh):
     return V, np.vstack([F[:, :3], F[:, [0, 2, 3]]])
 
 
-def sheet(count=7):
+def curved(count=7):
     """The curved patch in triangles."""
     return triangles(patch(count))
 
@@ -75,8 +75,8 @@ def _flat():
 
 
 @functools.cache
-def _flat_sheet():
-    V, F = sheet()
+def _flat_curved():
+    V, F = curved()
     uv = np.empty((len(V), 2))
     uv[F] = omt.unwrap(V, F, quality="draft", balance=1.0).uv
     return uv
@@ -88,43 +88,44 @@ def _ball():
     return omt.sphere_map(V, F, balance=0.5).positions
 
 
-def unwrapped():
+def _unwrapped():
     V, F = patch()
     omt.unwrap(V, F, density=ramp(V, F, 1, 4))
     pinned, places = np.zeros(F.size, bool), np.zeros((*F.shape, 2))
     for vertex, place in ((3, (0.0, 0.1)), (len(V) - 2, (1.1, 0.9))):
         places[vertex == F], pinned = place, pinned | (vertex == F).ravel()
     omt.unwrap(V, F, pins=(pinned, places))
-    W, G = sheet(4)
+    W, G = curved(4)
     omt.unwrap(np.vstack([V, 0.4 * W + 3]), [*F.tolist(), *(G + len(V)).tolist()], balance=0.3)
 
 
-def unwrapped_into_shapes():
+def _unwrapped_into_shapes():
     V, F = patch()
     omt.unwrap(V, F, boundary="disk", quality="draft")
     omt.unwrap(V, F, boundary="square", quality="exact")
 
 
-def bodies_cut_open():
+def _bodies_cut_open():
     omt.unwrap(*body(), max_shear=1.2)
     V, F = meshes.torus(12, 8)
     omt.unwrap(V * [1.3, 1.0, 0.8] + 0.1 * V[:, [1, 2, 0]] ** 2, F, fill_holes=True)
     omt.unwrap(*meshes.annulus(12, 3), seams=[(0, 12)])
 
 
-def magnified():
+def _magnified():
     V, F = patch()
     omt.magnify(V, F, _flat(), near_middle(V, F), 2.0)
     omt.refine(V, F, _flat(), balance=0.3)
-    W, G = sheet()
-    drain(refine_island.refine_island(W, G, _flat_sheet(), balance=0.2, pins=(np.array([0, 5]), _flat_sheet()[[0, 5]])))
+    W, G = curved()
+    pins = np.array([0, 5]), _flat_curved()[[0, 5]]
+    drain(refine_island.refine_island(W, G, _flat_curved(), balance=0.2, pins=pins))
     regions = np.stack([near_middle(W, G), np.clip(W[:, 0] - 0.9, 0, 1)])[:, G].mean(axis=2)
-    drain(magnify_regions.magnify_regions(_flat_sheet(), G, regions, [2.0, 0.7], exact=False))
+    drain(magnify_regions.magnify_regions(_flat_curved(), G, regions, [2.0, 0.7], exact=False))
     joint_density.joint_density(regions, face_areas(W, G) * ramp(W, G, 1, 2), [2.0, 0.5])
 
 
-def images():
-    W, G = sheet(3)
+def _images():
+    W, G = curved(3)
     rng = np.random.default_rng(2)
     old = 0.1 + 0.5 * W[G][:, :, :2]
     new = old * [0.9, 1.2] + 0.05
@@ -133,7 +134,7 @@ def images():
     inset_images.warp_with_insets(picture, old, new, size=(20, 28))
 
 
-def spheres():
+def _spheres():
     V, F = body()
     omt.sphere_map(V, F, balance=0.3, density=ramp(V, F, 1, 3))
     P, mass = _ball(), face_areas(V, F) * ramp(V, F, 1, 2)
@@ -142,11 +143,11 @@ def spheres():
     drain(dominitz_tannenbaum.flow_map(P, F, mass))
 
 
-def new_meshes():
+def _new_meshes():
     V, F = body()
     omt.remesh(V, F, 100, density=ramp(V, F, 1, 3), grading=0.5)
     omt.remesh(V, F, 120, strategy="app-cfp", rounds=0)
-    W, G = sheet()
+    W, G = curved()
     omt.remesh(W, G, 80)
     rough = omt.remesh(W, G, 60, fit=False)
     at = transfer.correspond(
@@ -154,21 +155,21 @@ def new_meshes():
     )
     transfer.to_vertices(at, G, np.column_stack([W[:, 0] ** 2, W[:, 1]]))
     corners = np.arange(3 * len(G)).reshape(-1, 3)
-    transfer.to_corners(at, corners, _flat_sheet()[G].reshape(-1, 2))
+    transfer.to_corners(at, corners, _flat_curved()[G].reshape(-1, 2))
     transfer.nearest_to_corners(at, corners, G.reshape(-1) % 5)
     transfer.nearest_to_vertices(at, G, np.arange(len(W)) % 7)
     transfer.to_faces(at, np.arange(len(G)), np.sin(np.arange(len(G))))
 
 
-def compared():
-    W, G = sheet()
+def _compared():
+    W, G = curved()
     drain(comparison.compare((W, G), (W + 0.02 * W[:, [1, 2, 0]], G), 200))
     comparison.compare_shapes(W, G)
     comparison.curvature_error(np.array([1.0, -2, 0.3]), np.array([1.5, -1.6, 0.1]))
 
 
-def told_apart():
-    V, F = sheet()
+def _told_apart():
+    V, F = curved()
     image = V * [1.2, 0.9, 0.7] + 0.1 * V[:, [1, 2, 0]] ** 2
     found = strain.beltrami.beltrami(V, F, image)
     found.histogram()
@@ -181,8 +182,8 @@ def told_apart():
     strain.match_figures((V, F), (image, F), (np.zeros(len(V), int), np.full((len(V), 3), 1 / 3)), image)
 
 
-def read_off():
-    V, F = sheet()
+def _read_off():
+    V, F = curved()
     curvature.sharpness(V, F)
     density.gaussian_curvature_density(V, F)
     density.mean_curvature_density(V, F)
@@ -191,11 +192,11 @@ def read_off():
     analysis.sharp_edges(V, F, np.radians(8))
     for which in ("gaussian", "saliency", "mean", "distance", "GAUSSIAN", "MEAN", "DISTANCE", "SALIENCY"):
         call(vertex_scores.vertex_score, which, V, F, np.arange(len(V)) < 4)
-    face_distortion(V, F, _flat_sheet()[F])
-    omt.distortion(V, F, _flat_sheet()[F])
-    overlap.covered_share(_flat_sheet() @ [1, 1j], F)
+    face_distortion(V, F, _flat_curved()[F])
+    omt.distortion(V, F, _flat_curved()[F])
+    overlap.covered_share(_flat_curved() @ [1, 1j], F)
     call(local_untangle.straighten_folds, F, folded() @ [1, 1j], np.ones(len(F)))
-    V2, F2 = sheet(4)
+    V2, F2 = curved(4)
     loop = np.array([0, 1, 2, 3, 4, 9, 14, 19, 24, 23, 22, 21, 20, 15, 10, 5])
     flat = V2[:, :2].copy()
     flat[12] += [0.5, 0.1]
@@ -214,13 +215,13 @@ def call(function, *args):
 
 def folded():
     """UVs (n,2) with a fold inside."""
-    uv = _flat_sheet().copy()
+    uv = _flat_curved().copy()
     uv[27] += 0.25
     return uv
 
 
-def arranged():
-    V, F = sheet(4)
+def _arranged():
+    V, F = curved(4)
     W, G = patch(4)
     turned, order = MOVE.apply(V) + 3, np.random.default_rng(4).permutation(len(V))
     other = np.empty_like(V)
@@ -239,8 +240,8 @@ def arranged():
     recombination.with_shorter_diagonals(V, F, diagonal)
 
 
-def in_contact():
-    V, F = sheet(5)
+def _in_contact():
+    V, F = curved(5)
     after = V.copy()
     after[:, 2] += 0.9 * np.sin(4 * V[:, 0]) * (V[:, 1] > 0.5)
     after[:, 0] -= 2.2 * np.clip(V[:, 0] - 0.7, 0, 1)
@@ -253,7 +254,7 @@ def in_contact():
     self_intersections.intersecting_pairs(after, F)
 
 
-def moved_by_flows():
+def _moved_by_flows():
     V, F = body()
     rows = np.flatnonzero(V[:, 0] > 0.9)
     handles = (
@@ -266,7 +267,7 @@ def moved_by_flows():
             drain(flows.flow(V, handles if isinstance(handles, tuple) else (handles,), options, F, domain))
 
 
-def laid_out():
+def _laid_out():
     V, F = body()
     P = _ball()
     m = len(F)
@@ -284,20 +285,20 @@ def laid_out():
             globe.equirectangular_areas(points, laid, polygons)
 
 
-def signed():
+def _signed():
     V, F = body()
     one = drain(signature.signature(V, F, 60))
     other = drain(signature.signature(MOVE.apply(V * [1, 1.3, 0.7]), F, 60))
     wasserstein.shape_distance(one, other)
     wasserstein.nearest(one, [other, one], 2)
-    W, G = sheet()
+    W, G = curved()
     drain(marked.marked_signature(W, G, 27, 3, 40))
     distances = np.linalg.norm(V[:9, None] - V[None, :9], axis=2)
     embedding.classical_scaling(distances)
     drain(reference.exact_transport(_ball(), F, face_areas(V, F), spherical_geometry.fibonacci_sphere(12)))
 
 
-def transported():
+def _transported():
     rng = np.random.default_rng(5)
     sites, mass = rng.random((40, 2)) - 0.5, 0.5 + rng.random(40)
     for domain in (Disk(), Rectangle(1.3), ConvexPolygon(np.array([[-1, -1], [1.2, -0.8], [0.9, 1], [-0.7, 1.1]]))):
@@ -308,8 +309,8 @@ def transported():
     drain(semidiscrete_sphere.sphere_transport(balls / np.linalg.norm(balls, axis=1, keepdims=True), mass))
 
 
-def named():
-    V, F = sheet()
+def _named():
+    V, F = curved()
     loop = np.array([0, 7, 63, 56])
     for kind in ("disk", "rectangle", "square", "free"):
         corners = None if kind in ("free", "disk") else loop
@@ -322,20 +323,20 @@ def named():
     drain(disk_map.conformal_disk(V, F))
 
 
-def divided():
-    for V, F in (body(), sheet()):
+def _divided():
+    for V, F in (body(), curved()):
         found = drain(partition.divide(V, F, 7, ramp(V, F, 1, 2)))
         partition.cut_along_cells(V, F, found)
         partition.follow_faces(found, np.arange(len(F)), F.ravel(), 3 * np.arange(len(F) + 1))
 
 
-def matched():
+def _matched():
     V, F = body()
     W = MOVE.apply(V * [1.2, 0.9, 1.0])
     chosen = np.array([3, 40, 90, 120])
     drain(register((V, F), (W, F), vertex_landmarks((chosen, F), (chosen, F))))
     suggestions.suggest_landmarks((V, F), (W, F), 4)
-    A, G = sheet(5)
+    A, G = curved(5)
     B = A * [1.1, 1, 1.4]
     drain(register((A, G), (B, G), vertex_landmarks((np.array([8, 22, 15]), G), (np.array([8, 22, 15]), G))))
     none = np.zeros((0, 2), int)
@@ -343,7 +344,7 @@ def matched():
     drain(chart_maps.register_charts((A, G, none), (B, G, none), corners, RegistrationOptions("charts")))
 
 
-def insides():
+def _insides():
     X, T = grid_of_tets(3, 0.15, 1)
     on = tet_mesh.boundary_vertices(T)
     Y = X - X.mean(axis=0)
@@ -364,7 +365,7 @@ def insides():
     tet_mesh.boundary_triangles(T)
 
 
-def subdivided():
+def _subdivided():
     V, F = patch(3)
     cage = catmull_clark.cage_of(F.ravel(), np.arange(0, F.size + 1, 4), len(V))
     for limit in (True, False):
@@ -375,8 +376,8 @@ def subdivided():
     modifier.subdivided_uv(F.ravel(), np.arange(0, F.size + 1, 4), F.ravel(), way, 1)
 
 
-def found_on_meshes():
-    V, F = sheet(5)
+def _found_on_meshes():
+    V, F = curved(5)
     index = closest_point.ClosestPoint(V, F, 0.2)
     there = V[F].mean(axis=1) + 0.1 * np.sin(np.arange(3 * len(F))).reshape(-1, 3)
     index(there, geometry.face_normals(V, F))
@@ -385,10 +386,10 @@ def found_on_meshes():
     closest_point.random_points(face_areas(V, F), 20, np.random.default_rng(1))
 
 
-def upright():
+def _upright():
     """Charts turned, refined together, begun in every shape, parted, and symmetric ones."""
-    V, F = sheet()
-    chart, uv = charts.strict_charts(surface_of(V, F))[0], _flat_sheet()
+    V, F = curved()
+    chart, uv = charts.strict_charts(surface_of(V, F))[0], _flat_curved()
     turned = (uv @ [1, 1j] * np.exp(0.7j)).view(float).reshape(-1, 2)
     upright_maps.turn_upright([chart, chart], [turned, 2 * turned], [[0.1, 1.0, 0.2], [0, 0, 1.0]])
     drain(batch_refine.refine_batch([(V, F), (0.5 * V[:, [1, 0, 2]], F[:, ::-1])], "standard", 0.1))
@@ -404,7 +405,7 @@ def surface_of(V, F):
     return omt.polygon_surface(V, F)
 
 
-def with_symmetry():
+def _with_symmetry():
     """Bodies and patches that are their own mirror images."""
     V, F = meshes.icosphere(2)
     W = V * [1.0, 1.4, 0.8] * (1 + 0.2 * np.abs(V[:, [0]]) + 0.1 * V[:, [2]])
@@ -413,8 +414,7 @@ def with_symmetry():
     A, G = meshes.two_bumps(10)
     omt.unwrap(A, G, balance=0.2)
     omt.unwrap(A, G, boundary="square")
-    B, H = meshes.cube()
-    omt.unwrap(B * [1.0, 1.2, 0.9], H)
+    omt.unwrap(meshes.cube()[0] * [1.0, 1.2, 0.9], meshes.cube()[1])
     omt.unwrap(*comb_of_quads())
 
 
@@ -424,7 +424,7 @@ def comb_of_quads():
     return np.column_stack([V[:, 0], V[:, 1], 0.2 * V[:, 0] ** 2 + 0.1 * V[:, 1]]), F
 
 
-def cages():
+def _cages():
     """A cage refined for its subdivided surface."""
     V, F = patch(4)
     start = np.arange(0, F.size + 1, 4)
@@ -441,10 +441,10 @@ def cages():
 
 
 RUNS = {
-    function.__name__: function
+    function.__name__.strip("_"): function
     for function in (
-        unwrapped, unwrapped_into_shapes, bodies_cut_open, magnified, images, spheres, new_meshes, compared, told_apart,
-        read_off, arranged, in_contact, moved_by_flows, laid_out, signed, transported, named, divided, matched,
-        insides, subdivided, found_on_meshes, upright, with_symmetry, cages,
+        _unwrapped, _unwrapped_into_shapes, _bodies_cut_open, _magnified, _images, _spheres, _new_meshes, _compared,
+        _told_apart, _read_off, _arranged, _in_contact, _moved_by_flows, _laid_out, _signed, _transported, _named,
+        _divided, _matched, _insides, _subdivided, _found_on_meshes, _upright, _with_symmetry, _cages,
     )
 }  # fmt: skip
