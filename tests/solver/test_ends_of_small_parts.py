@@ -46,7 +46,7 @@ def test_quads_are_dented_in_charts_that_look_to_the_other_side_as_well():
     uv = chart.vertices[:, :2].copy()
     for other, way in ((chart, [1, 1]), (turned, [-1, 1])):
         assert not len(dented_faces(surface, other, uv * way))
-    uv[np.linalg.norm(uv - uv.mean(axis=0), axis=1).argmin()] += 0.105
+    uv[np.linalg.norm(uv - uv.mean(axis=0), axis=1).argmin()] += 0.1485
     found = dented_faces(surface, chart, uv)
     assert len(found) == 1 and np.array_equal(found, dented_faces(surface, turned, uv * [-1, 1]))
 
@@ -71,3 +71,14 @@ def test_pairs_that_intersected_before_are_old_whichever_comes_first():
         after = V + np.array([0.05, 0.02, 0.1]) * (np.arange(6) > 2)[:, None]
         assert len(intersecting_pairs(after, F)) == 1
         assert not len(NewCrossings(V, FaceCrossings(F)).pairs(after))
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [0, 2, 1], [1, 0, 2], [2, 1, 0]])
+def test_what_went_through_a_triangle_is_old_in_the_next_one_too(order):
+    """A blade slides from one triangle of a square into the other, whatever comes first."""
+    square = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [2, 2, 0]]
+    V = np.array([*square, [0.5, 0.5, -1], [0.6, 0.5, 1], [0.5, 0.7, 1.0]])
+    F = np.array([[0, 1, 2], [4, 5, 6], [1, 3, 2]])[order]
+    after = V + 0.9 * (np.arange(7) > 3)[:, None] * [1, 1, 0]
+    assert len(intersecting_pairs(V, F)) == len(intersecting_pairs(after, F)) == 1
+    assert not len(NewCrossings(V, FaceCrossings(F)).pairs(after))
