@@ -376,13 +376,14 @@ def _into_shape(island: Island, weights: np.ndarray, settings: MagnifySettings) 
 
 
 def _overall(magnified: Sequence[_MagnifiedIsland]) -> Shares:
-    """Shares of the region in all islands that it touches, by their UV area."""
+    """Shares of the region in all islands that it touches, and the mean of their contrasts, by their UV area."""
     size = np.array([island.area.sum() for island in magnified])
     size = size / size.sum()
     before = size @ [region_share(p.region, p.area) for p in magnified]
     target = size @ [p.found.target_share for p in magnified]
     after = size @ [region_share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in magnified]
-    return Shares(before=float(before), target=float(target), after=float(after), contrast=magnified[0].found.contrast)
+    contrast = size @ [p.found.contrast for p in magnified]
+    return Shares(before=float(before), target=float(target), after=float(after), contrast=float(contrast))
 
 
 def _report(done: _MagnifiedIsland) -> dict:
