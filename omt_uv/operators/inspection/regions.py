@@ -63,9 +63,11 @@ class UV_OT_omt_attributes(QuickOperator, bpy.types.Operator):
 
         if context.mode != "OBJECT":
             raise Complaint("Attributes are written in Object Mode. Leave Edit Mode first.")
-        pairs = check_all_local(read_objects(context))
+        pairs, values = check_all_local(read_objects(context)), []
+        for obj, reading in pairs:
+            with complaints(obj):
+                values.append(face_values(reading))
         with complaints():
-            values = [face_values(reading) for _, reading in pairs]
             for (obj, _), found in zip(pairs, values, strict=True):
                 write_face_values(obj, found)
         self.report({"INFO"}, f"Written to {', '.join(NAMES)}")
