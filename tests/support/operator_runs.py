@@ -25,7 +25,7 @@ RUNS: dict[str, tuple[str, dict, str]] = {
     "weights": ("object.omt_weights", {"kind": "GAUSSIAN", "weight_group": "new"}, "group new"),
     "mean": ("object.omt_weights", {"kind": "MEAN", "weight_group": "region"}, "group region"),
     "cells": ("mesh.omt_partition",
-              {"cells": 4, "relax": 0, "write": "ATTRIBUTE", "capacity_group": "region"}, "OMT Partition"),
+              {"cells": 4, "relax": 0, "write": "ATTRIBUTE", "capacity_group": "region"}, "OMT Cell"),
     "attributes": ("uv.omt_attributes", {}, "OMT UV Area"),
     "overlay": ("uv.omt_overlay", {}, "OMT UV Distortion"),
 }  # fmt: skip

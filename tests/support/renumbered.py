@@ -71,7 +71,7 @@ def told(obj, faces, order: Order) -> dict:
     for attribute in mesh.attributes:
         if attribute.domain in back and (not attribute.name.startswith(".") or attribute.name == ".sculpt_face_set"):
             key, width, dtype = scenes._VALUE[attribute.data_type]
-            if dtype is not np.float32 and attribute.name != ".sculpt_face_set":
+            if dtype is bool:
                 continue
             values = np.zeros(len(attribute.data) * width, dtype)
             attribute.data.foreach_get(key, values)
