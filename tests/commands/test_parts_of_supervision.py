@@ -65,6 +65,16 @@ def test_what_a_child_has_used_is_its_own(supervision):
     assert supervision._wait(again) == (None, None)
 
 
+def test_seconds_are_those_of_the_program_and_of_the_system_for_it(supervision, monkeypatch):
+    import os
+
+    usage = SimpleNamespace(ru_utime=1.5, ru_stime=0.25, ru_maxrss=3)
+    monkeypatch.setattr(os, "wait4", lambda pid, _: (pid, 3 << 8, usage), raising=False)
+    child = SimpleNamespace(pid=7)
+    assert supervision._wait(child) == (1.75, 3 if sys.platform == "darwin" else 3 * 1024)
+    assert child.returncode == 3
+
+
 def test_where_the_system_tells_nothing_of_a_child_its_end_is_waited_for(supervision, monkeypatch):
     monkeypatch.delattr(os, "wait4", raising=False)
     waited = []

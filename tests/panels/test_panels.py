@@ -520,3 +520,16 @@ def test_landmarks_are_set_where_the_match_beside_looks_for_them(package):
             assert given == [properties.landmark_prefix or None] * 3
     finally:
         properties.property_unset("landmark_prefix")
+
+
+@pytest.mark.parametrize("prefix", ["VIEW3D", "IMAGE"])
+def test_the_help_of_a_section_is_the_page_of_its_first_operator(package, prefix):
+    """That is what its title says, and not one of the buttons below."""
+    sidebar = package("panels.sidebar")
+    for section in sidebar.SECTIONS:
+        button = types.SimpleNamespace()
+        layout = types.SimpleNamespace(operator=lambda *_, button=button, **__: button)
+        panel = getattr(bpy.types, sidebar._name(prefix, section.name))
+        sidebar.TabPanel.draw_header_preset(types.SimpleNamespace(layout=layout, section=panel.section), None)
+        assert panel.section is section and button.section == section.name
+        assert button.operator == (section.operators[0] if section.operators else "uv.omt_measure")

@@ -56,3 +56,11 @@ def test_operators_that_are_not_there_are_left_out(package, chosen, monkeypatch)
     chosen.margin = 11
     module.apply(chosen, bpy.context)
     assert last_of("UV_OT_omt_unwrap").margin == 11
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_runs_are_on_a_thread_of_their_own_where_that_is_preferred(package, chosen, own):
+    package("session.run").threads = not own
+    chosen.own_thread = own
+    package("panels.preferences").apply(chosen, bpy.context)
+    assert package("session.run").threads is own

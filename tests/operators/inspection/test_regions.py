@@ -42,3 +42,17 @@ def test_another_attribute_of_that_name_is_refused_and_nothing_changes(bump):
     assert "OMT UV Area" not in bump.data.attributes
     bpy.ops.object.mode_set(mode="EDIT")
     assert "Object Mode" in scenes.error_of(bpy.ops.uv.omt_attributes)
+
+
+def test_texel_densities_are_those_of_the_texture_that_is_chosen(package, bump, monkeypatch):
+    """Nothing else in the table is of the texture."""
+    region_figures = package("pipelines.measuring.region_figures")
+    tables, told = [], region_figures.table_text
+    monkeypatch.setattr(region_figures, "table_text", lambda rows, *more: tables.append(rows) or told(rows, *more))
+    for size in (1024, 256):
+        assert bpy.ops.uv.omt_regions(kind="GROUPS", texture_size=size) == {"FINISHED"}
+    assert len(tables[0]) == 2
+    for one, other in zip(*tables, strict=True):
+        first, second = vars(one), vars(other)
+        assert first.pop("texel_density") == pytest.approx(4 * second.pop("texel_density"))
+        assert first == second
