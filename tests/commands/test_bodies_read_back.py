@@ -165,3 +165,53 @@ def test_a_surface_matched_with_itself_gets_all_that_it_has_and_its_figures_are_
     np.testing.assert_allclose(found, weights, atol=2e-2)
     assert [face.material_index for face in obj.data.polygons] == [k % 2 for k in range(len(obj.data.polygons))]
     assert len(obj.data.uv_layers) == 1
+
+
+ROWS = {"partition": ("meshes", ["--cells", "4", "--relax", "0"]), "sphere": ("charts", ["--quality", "draft"]),
+        "volume": ("volumes", TETS), "remesh": ("levels", ["--vertices", "40", "--levels", "2"])}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_each_of_several_objects_has_the_row_that_it_has_alone(package, run, folder, monkeypatch, name):
+    if name == "volume":
+        pytest.importorskip("tetgen")
+    monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 500)
+    key, words = ROWS[name]
+    both, *single = (told(run, folder, name, "-o", folder / "out.blend", *words, *chosen)[key]
+                     for chosen in ([], ["--object", "A"], ["--object", "B"]))  # fmt: skip
+    alone = [row for rows in single for row in rows]
+    assert [row["object"] for row in both] == [row["object"] for row in alone]
+    assert len({json.dumps(row) for row in both}) == len(both) >= 2
+    assert both == alone
+
+
+def test_what_writers_of_every_level_say_is_told_once(package, monkeypatch, tmp_path):
+    remesh, saving = package("commands.remesh"), package("files.saving")
+    said = {"x_LOD0.obj": ["a", "b"], "x_LOD1.obj": ["b"], "x_LOD2.obj": ["c", "a"]}
+    objects = [[f"{name}{k}" for k in range(3)] for name in "AB"]
+    for name in (name for names in objects for name in names):
+        bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    written = {}
+
+    def save(path, made, *_):
+        written[path.name] = [obj.name for obj in made]
+        return said[path.name]
+
+    monkeypatch.setattr(saving, "save", save)
+    assert remesh._save(tmp_path / "x.obj", objects, tmp_path / "in.obj") == ["a", "b", "c"]
+    assert written == {f"x_LOD{k}.obj": [f"A{k}", f"B{k}"] for k in range(3)}
+
+
+def test_slots_without_a_material_are_regions_by_their_number(run, folder, tmp_path):
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "in.blend"))
+    mesh = bpy.data.objects["A"].data
+    for material in (bpy.data.materials.new("one"), None, None):
+        mesh.materials.append(material)
+    for face in mesh.polygons:
+        face.material_index = face.index % 3
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, out, err = run("measure", tmp_path / "in.blend", "--object", "A", "--beltrami", "--json")
+    assert status == 0, err
+    rows = {row["name"]: row["share"] for row in json.loads(out)["A"]}
+    slots = [f"material {name}" for name in ("one", "1", "2")]
+    assert {"all", *slots} <= rows.keys() and sum(rows[name] for name in slots) == pytest.approx(1)
