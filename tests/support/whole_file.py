@@ -37,6 +37,8 @@ def told() -> dict[str, str]:
                 _walk(block, path, found, 0)
                 if isinstance(block, bpy.types.Mesh):
                     _attributes(block, path, found)
+                if isinstance(block, bpy.types.Object) and block.type == "MESH":
+                    found[f"{path}/active group"] = str(block.vertex_groups.active_index)
     return found
 
 
