@@ -54,7 +54,7 @@ def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None
     if faces is not None:
         label = _labels(welded)
         faces = np.isin(label, label[faces])
-    faces, triangles, owner = chosen_triangles(welded, faces)
+    faces, triangles, owner = chosen_triangles(surface, faces)
     wrong = np.unique(owner[~np.isfinite(uv[triangles]).all((1, 2))])
     if len(wrong):
         raise FoldedUVError("The UVs to refine are not finite", kind="face", elements=wrong)

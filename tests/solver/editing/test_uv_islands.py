@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.editing.uv_islands import uv_islands
-from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, ZeroAreaFaceError
+from omt_uv.solver.errors import FoldedUVError, NonFiniteError, NonManifoldEdgeError, ZeroAreaFaceError
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 
@@ -65,6 +65,18 @@ def test_uvs_that_are_nowhere_are_named():
     with pytest.raises(FoldedUVError) as info:
         uv_islands(triangle_surface(V, F), corner_uv(F, uv))
     assert sorted(info.value.elements) == np.flatnonzero((F == 7).any(1)).tolist()
+
+
+@pytest.mark.parametrize("faces", [None, 0, -1])
+def test_vertices_that_are_nowhere_have_their_numbers_on_the_surface(faces):
+    """UV vertices have others: of the last vertex there are several before it."""
+    surface, corners, _ = torn()
+    last = surface.corner_vertex[-1]
+    surface.positions[[0, last]] = np.nan
+    chosen = None if faces is None else np.arange(len(surface.face_start) - 1) == np.arange(len(corners) // 3)[faces]
+    with pytest.raises(NonFiniteError) as caught:
+        uv_islands(surface, corners, chosen)
+    assert caught.value.elements.tolist() == {None: [0, last], 0: [0], -1: [last]}[faces]
 
 
 @pytest.mark.parametrize("change", [lambda uv: 1e3 * uv, lambda uv: uv + 1, lambda uv: uv * [-1, 1]])
