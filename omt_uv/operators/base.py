@@ -156,6 +156,21 @@ def complaints(about=None, objects: Sequence = (), others: tuple[type[Exception]
         raise Complaint(str(error)) from error
 
 
+@contextmanager
+def blaming(pairs: list) -> Iterator[None]:
+    """Name the first object, of pairs of object and Reading that a block measures as one, that has no measure."""
+    from ..pipelines.distortion import measure_readings
+    from ..solver.errors import MeshError
+
+    try:
+        yield
+    except MeshError:
+        for obj, reading in pairs:
+            with complaints(obj):
+                measure_readings([reading])
+        raise
+
+
 def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Complaint) -> set[str]:
     """Select what is wrong, report it, and cancel."""
     names, action = [obj.name for obj in last_run.chosen_objects(context)], ""

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty
 
 from ..display import overlay
 from ..session import last_run
-from .base import QuickOperator, check_all_local, figures_of, read_objects
+from .base import QuickOperator, blaming, check_all_local, figures_of, read_objects
 
 KINDS = (
     ("NONE", "Off", "No colours; attributes and shading are as before", "X", 0),
@@ -29,7 +29,8 @@ class UV_OT_omt_measure(QuickOperator, bpy.types.Operator):
 
         pairs = read_objects(context)
         readings = [reading for _, reading in pairs]
-        measured = measure_readings(readings)
+        with blaming(pairs):
+            measured = measure_readings(readings)
         self.report({"INFO"}, summary(measured, on_subdivision(readings)))
         found, overlap = figures_of(context, readings, measured=measured), last_run.overlap_row(measured.overlap or 0.0)
         names = tuple(obj.name for obj, _ in pairs)
@@ -55,7 +56,9 @@ class UV_OT_omt_overlay(QuickOperator, bpy.types.Operator):
         if self.show == "NONE":
             overlay.hide(context)
         else:
-            overlay.show(context, check_all_local(read_objects(context)), self.show)
+            pairs = check_all_local(read_objects(context))
+            with blaming(pairs):
+                overlay.show(context, pairs, self.show)
 
 
 class UV_OT_omt_histogram(QuickOperator, bpy.types.Operator):
@@ -70,8 +73,10 @@ class UV_OT_omt_histogram(QuickOperator, bpy.types.Operator):
         from ..display.histogram import histogram, thumbnail
         from ..pipelines.subdivision import evaluated
 
-        readings = [evaluated(reading) for _, reading in read_objects(context)]
-        image = show(HISTOGRAM, histogram(readings))
+        pairs = read_objects(context)
+        readings = [evaluated(reading) for _, reading in pairs]
+        with blaming(pairs):
+            image = show(HISTOGRAM, histogram(readings))
         set_preview(image, thumbnail(readings))
         if context.space_data is not None and context.space_data.type == "IMAGE_EDITOR":
             context.space_data.image = image

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import QuickOperator, read_objects, read_writable
+from .base import QuickOperator, blaming, read_objects, read_writable
 
 SCOPES = (
     ("ISLANDS", "Every Island", "Every island gets this density, about its own middle"),
@@ -57,7 +57,9 @@ class UV_OT_omt_density_get(TextureSize, QuickOperator, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         from ..pipelines.texel_density import texel_density
 
-        found = texel_density([reading for _, reading in read_objects(context)], self.texels(context))
+        pairs = read_objects(context)
+        with blaming(pairs):
+            found = texel_density([reading for _, reading in pairs], self.texels(context))
         target = context.window_manager.operator_properties_last(UV_OT_omt_density_set.bl_idname)
         found /= UNITS_PER_METRE[self.unit]
         target.density, target.texture_size, target.unit = found, self.texture_size, self.unit
@@ -91,6 +93,7 @@ class UV_OT_omt_density_set(TextureSize, QuickOperator, bpy.types.Operator):
 
         objects, readings = read_writable(context)
         target = self.density * UNITS_PER_METRE[self.unit]
-        scaled = with_texel_density(readings, target, self.texels(context), self.scope == "ISLANDS")
+        with blaming(list(zip(objects, readings, strict=True))):
+            scaled = with_texel_density(readings, target, self.texels(context), self.scope == "ISLANDS")
         for obj, (corners, uv) in zip(objects, scaled, strict=True):
             write_uv(obj, obj.data.uv_layers.active.name, corners, uv)

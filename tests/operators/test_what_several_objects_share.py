@@ -15,9 +15,12 @@ from operator_runs import RUNS
 
 ARRANGING = {"stack": ("uv.omt_stack", {}, "UVMap"), "symmetrize": ("uv.omt_symmetrize", {}, "UVMap"),
              "rectify": ("uv.omt_rectify", {}, "UVMap")}  # fmt: skip
-EVERY = RUNS | ARRANGING
-# Of UVs alone, and of all chosen objects as one surface, of which the first error has no object.
-NOT_OF_ONE = {"push", "density", "overlay"}
+# What writes nothing.
+MEASURING = {"measure": ("uv.omt_measure", {}, ""), "histogram": ("uv.omt_histogram", {}, ""),
+             "get": ("uv.omt_density_get", {}, "")}  # fmt: skip
+EVERY = RUNS | ARRANGING | MEASURING
+# Of UVs alone.
+NOT_OF_ONE = {"push"}
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +74,8 @@ def test_the_one_that_is_wrong_is_named_and_nothing_is_written(uvs, name, place)
     before = [scenes.state(obj) for obj in objects]
     said = scenes.error_of(run(name))
     assert bad.name in said and not any(obj.name in said for obj in objects if obj != bad), said
+    # Numbers of vertices are those of the object that is named.
+    assert name in ARRANGING or "(1 vertex: 5)" in said, said
     assert [scenes.state(obj) for obj in objects] == before
 
 
