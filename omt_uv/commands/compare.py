@@ -8,7 +8,7 @@ import io
 import json
 from pathlib import Path
 
-from .common import CommandError, check_paths, drain_shown, refusals, require_blender, write_picture
+from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, write_picture
 from .options import add_input
 from .selection import read_file
 
@@ -53,6 +53,10 @@ def run(options: argparse.Namespace) -> None:
     require_blender()
     if options.plot is not None and options.plot.suffix.lower() != ".png":
         raise CommandError(f"{options.plot}: a plot is a picture. Name a .png file.")
+    if options.shape_key and not options.beltrami:
+        raise UsageError("--shape-key goes with --beltrami. Give both.")
+    if options.beltrami and (options.plot is not None or options.csv or options.samples):
+        raise UsageError("--plot, --csv and --samples are of distances, which --beltrami has not. Leave them away.")
     check_paths(options)
     if options.beltrami:
         print(_strain(options))

@@ -56,14 +56,16 @@ def run(options: argparse.Namespace) -> None:
         raise CommandError(f"{options.attributes}: only .blend files keep attributes of faces. Write one of these.")
     if options.csv and not options.regions:
         raise UsageError("--csv is a table of regions. Name these by --regions.")
+    if options.shape_key and not options.beltrami:
+        raise UsageError("--shape-key goes with --beltrami. Give both.")
+    if options.beltrami and options.regions:
+        raise UsageError("--beltrami has regions of its own. Leave --regions away.")
     check_paths(options, [options.attributes] if options.attributes else [])
     with refusals(name=str(options.input)):
         pairs = read_file(options)
-        if options.beltrami:
-            print(_strain(pairs, options))
-            return
         readings = [reading for _, reading in pairs]
-        figures = measure_readings(readings)
+        strain = _strain(pairs, options) if options.beltrami else ""
+        figures = None if options.beltrami else measure_readings(readings)
         if options.histogram:
             from ..display.histogram import histogram
 
@@ -72,6 +74,9 @@ def run(options: argparse.Namespace) -> None:
         rows = _regions(options, pairs) if options.regions else []
         if options.attributes:
             _write_attributes(options, pairs)
+    if figures is None:
+        print(strain)
+        return
     subdivided = on_subdivision(readings)
     more: dict[str, object] = {"on_subdivided_surface": True} if subdivided else {}
     if options.csv:

@@ -225,6 +225,12 @@ SOME = {
     "average @shapes -o @shapes/a.blend": "Give the mean a name of its own",
     "average @shapes -o #out.blend --report @shapes/b.blend": "Give each a name of its own",
     "compare @two.blend @in.blend --beltrami": "one by --object",
+    "compare @in.blend @other.blend --beltrami --plot #plot.png": "Leave them away",
+    "compare @in.blend @other.blend --beltrami --csv": "Leave them away",
+    "compare @in.blend @other.blend --beltrami --samples 9": "Leave them away",
+    "compare @in.blend @other.blend --shape-key Smile": "--beltrami. Give both",
+    "measure @in.blend --shape-key Smile": "--beltrami. Give both",
+    "measure @in.blend --beltrami --regions groups": "Leave --regions away",
     "distance @two.blend @in.blend --markers 0,1": "Choose it by --object",
     "distance @in.blend @other.blend --markers 0,900": "no vertex 900",
 }  # fmt: skip

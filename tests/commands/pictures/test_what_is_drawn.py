@@ -215,11 +215,13 @@ def test_diagrams_are_drawn_where_the_cells_of_the_file_lie(run, tmp_path, body,
     assert len(set(figures)) == 1
 
 
-@pytest.mark.parametrize("words", ["measure @in --histogram #", "compare @in @other --plot #"])
+@pytest.mark.parametrize("words", ["measure @in --histogram #", "measure @in --beltrami --histogram #",
+                                   "measure @in --beltrami --preview #", "compare @in @other --plot #"])  # fmt: skip
 def test_plots_change_nothing_of_what_is_printed(run, package, monkeypatch, body, words):
     # A hundred thousand points take most of the time of so small a mesh.
     monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 2000)
     given = [body / f"{word[1:]}.blend" if word[0] == "@" else word for word in words.split()]
+    (body / "plot.png").unlink(missing_ok=True)
     plain, drawn = run(*given[:-2]), run(*given[:-1], body / "plot.png")
     assert plain[0] == 0 and plain == drawn
     assert len(np.unique(pixels(body / "plot.png").reshape(-1, 3), axis=0)) > 3
