@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import scenes
 import uv_scenes
+from sphere_shapes import blob
 
 FREE_OF_PREVIEWS, FREE_OF_CELLS, SAMPLES = 0.06, 0.03, 2
 # Pixels of a tile, and how far from an edge coverage is certain of what files hold with few digits.
@@ -225,6 +226,28 @@ def test_plots_change_nothing_of_what_is_printed(run, package, monkeypatch, body
     plain, drawn = run(*given[:-2]), run(*given[:-1], body / "plot.png")
     assert plain[0] == 0 and plain == drawn
     assert len(np.unique(pixels(body / "plot.png").reshape(-1, 3), axis=0)) > 3
+
+
+def test_pictures_of_distances_hang_on_classes_and_change_no_distance(run, tmp_path):
+    (tmp_path / "shapes").mkdir()
+    for k in range(3):
+        scenes.open_empty()
+        V, F = blob(1, seed=k)
+        scenes.add(V, F)
+        save(tmp_path / "shapes" / f"s{k}.blend")
+    assert run("library", tmp_path / "shapes", "-o", tmp_path / "i.npz", "--points", 60)[0] == 0
+    (tmp_path / "l.csv").write_text("s0.blend,one\ns1.blend,two\ns2.blend,two\n")
+    labels, tables = ("--labels", tmp_path / "l.csv"), set()
+    drawn: dict[str, list] = {"--picture": [], "--mds": []}
+    for option, classes in [("", ()), *((kind, more) for kind in drawn for more in ((), labels))]:
+        given = (option, tmp_path / "p.png") if option else ()
+        (tmp_path / "p.png").unlink(missing_ok=True)
+        status, _, err = run("distances", tmp_path / "i.npz", "-o", tmp_path / "d.csv", *given, *classes)
+        assert status == 0, err
+        tables.add((tmp_path / "d.csv").read_bytes())
+        if option:
+            drawn[option].append((tmp_path / "p.png").read_bytes())
+    assert len(tables) == 1 and all(plain != classed for plain, classed in drawn.values())
 
 
 def test_images_follow_the_uvs_in_the_size_that_was_asked_for(run, tmp_path, body):
