@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> None:
     if options.shape_key and not options.beltrami:
         raise UsageError("--shape-key goes with --beltrami. Give both.")
     if options.beltrami and (options.plot is not None or options.csv or options.samples):
-        raise UsageError("--plot, --csv and --samples are of distances, which --beltrami has not. Leave them away.")
+        raise UsageError("--plot, --csv and --samples are of distances, which --beltrami has not. Leave them out.")
     check_paths(options)
     if options.beltrami:
         print(_strain(options))

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> None:
     if options.shape_key and not options.beltrami:
         raise UsageError("--shape-key goes with --beltrami. Give both.")
     if options.beltrami and options.regions:
-        raise UsageError("--beltrami has regions of its own. Leave --regions away.")
+        raise UsageError("--beltrami has regions of its own. Leave --regions out.")
     check_paths(options, [options.attributes] if options.attributes else [])
     with refusals(name=str(options.input)):
         pairs = read_file(options)
