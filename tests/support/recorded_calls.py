@@ -153,11 +153,20 @@ def _watched(record: Record, name: str, function: Callable, is_method: bool) -> 
     return plain
 
 
+def forget() -> None:
+    """Empty the caches of the solver: what other tests have called is called again."""
+    for module in modules():
+        for value in vars(module).values():
+            if hasattr(value, "cache_clear"):
+                value.cache_clear()
+
+
 @contextmanager
 def recorded(most: int = 1) -> Iterator[Record]:
     """A context in which the first calls of every public function and method of the solver are kept."""
     record, everything, before = Record(most), modules(), []
     watched = {}
+    forget()
     for module in everything:
         for name, owner, attribute, function in _public(module):
             if owner is None:

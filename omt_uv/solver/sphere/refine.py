@@ -79,7 +79,7 @@ def sphere_refine(
     balance: float = 0.0,
     quality: str = "standard",
     polygons: np.ndarray | None = None,
-    mirrored: np.ndarray | None = None,
+    mirror_polygons: np.ndarray | None = None,
 ) -> Steps[SphereRefinement]:
     """Refine a map (n,3) of a closed surface (n,3), (m,3) to the sphere until every polygon has its area.
 
@@ -93,7 +93,7 @@ def sphere_refine(
     quality : "draft", "standard" or "exact"
     polygons : (m,) polygon of every triangle; by default each is its own. A mesh that is its own mirror image gets a
         symmetric map
-    mirrored : (m,) polygons by which it is its own mirror image, those of the areas by default
+    mirror_polygons : (m,) polygons by which it is its own mirror image, those of the areas by default
 
     Raises
     ------
@@ -113,11 +113,12 @@ def sphere_refine(
         raise FoldedUVError("Folds of the transport map could not be straightened", kind="face", elements=folded)
     by_triangle, problem = problem, _of_polygons(problem, vertices[order], polygons)
     faces = problem.faces
-    if mirrored is None:
-        mirrored = polygons
+    if mirror_polygons is None:
+        mirror_polygons = polygons
     else:
-        faces, problem = _of_polygons(by_triangle, vertices[order], mirrored).faces, replace(problem, uneven=True)
-    symmetry = find_symmetry(vertices[order], by_triangle.faces.triangles, mirrored, faces)
+        faces = _of_polygons(by_triangle, vertices[order], mirror_polygons).faces
+        problem = replace(problem, uneven=True)
+    symmetry = find_symmetry(vertices[order], by_triangle.faces.triangles, mirror_polygons, faces)
     found, settings = None, QUALITIES[quality]
     if symmetry is not None:
         refining = _symmetric(problem, by_triangle, symmetry.images, start, balance, settings)

@@ -122,7 +122,7 @@ def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMa
     warnings = list(surface.warnings)
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
     few = joined is not None and joined is not polygons and _joined_share(joined, polygons) <= FEW_JOINED
-    options = options | ({"polygons": polygons, "mirrored": joined} if few else {"polygons": joined})
+    options = options | ({"polygons": polygons, "mirror_polygons": joined} if few else {"polygons": joined})
     sites, found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
     refined, flow = None, (yield from part_of(_flow(found, surface, target, method), *TRANSPORT))
     if found is not None and flow is not None and method == MOSER:
