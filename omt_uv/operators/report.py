@@ -60,9 +60,15 @@ def report_text(context: bpy.types.Context) -> str:
     if state.summary is not None:
         lines.append(f"last run: {state.summary.title}")
         lines += [f"  {name}: {value}" for name, value in state.summary.rows]
-        lines += [f"  warning: {text}" for text in state.summary.warnings]
-    lines.append(f"last error: {state.error or 'none'}")
+        lines += [f"  warning: {_nameless(text)}" for text in state.summary.warnings]
+    lines.append(f"last error: {_nameless(state.error or 'none')}")
     return "\n".join(lines) + "\n"
+
+
+def _nameless(text: str) -> str:
+    """What is told of an object, without its name: that is nobody's but the artist's."""
+    names = sorted((obj.name for obj in bpy.data.objects), key=len, reverse=True)
+    return next((text.removeprefix(f"{name}: ") for name in names if text.startswith(f"{name}: ")), text)
 
 
 def _version(name: str) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bpy
 
+import numpy as np
 import pytest
 import scenes
 
@@ -456,6 +457,17 @@ def test_the_report_has_what_a_bug_needs(package):
     ):
         assert word in text
     assert "Cube" not in text  # no names of files or objects
+
+
+def test_the_report_names_none_of_several_objects(package):
+    one, other = scenes.cube(), scenes.cube()
+    one.name, other.name = "Lord of Hidden Lake", "Lord"
+    scenes.select([one, other])
+    for obj in (one, other):
+        scenes.error_of(bpy.ops.uv.omt_density_set)
+        text = package("operators.report").report_text(bpy.context)
+        assert "Lord" not in text and "warning: There are no UVs" in text
+        scenes.set_uv(obj, np.random.default_rng(0).random((24, 2)))
 
 
 def test_the_choices_are_those_of_the_solver_and_of_the_command(package):

@@ -112,13 +112,11 @@ def sphere_refine(
     if len(folded):
         raise FoldedUVError("Folds of the transport map could not be straightened", kind="face", elements=folded)
     by_triangle, problem = problem, _of_polygons(problem, vertices[order], polygons)
-    faces = problem.faces
-    if mirror_polygons is None:
-        mirror_polygons = polygons
-    else:
-        faces = _of_polygons(by_triangle, vertices[order], mirror_polygons).faces
+    faces, mirrored = problem.faces, polygons
+    if mirror_polygons is not None:
+        faces, mirrored = _of_polygons(by_triangle, vertices[order], mirror_polygons).faces, mirror_polygons
         problem = replace(problem, uneven=True)
-    symmetry = find_symmetry(vertices[order], by_triangle.faces.triangles, mirror_polygons, faces)
+    symmetry = find_symmetry(vertices[order], by_triangle.faces.triangles, mirrored, faces)
     found, settings = None, QUALITIES[quality]
     if symmetry is not None:
         refining = _symmetric(problem, by_triangle, symmetry.images, start, balance, settings)
