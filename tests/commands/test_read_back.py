@@ -10,6 +10,7 @@ import bpy
 import command_runs
 import numpy as np
 import pytest
+import scenes
 import whole_file
 
 BODIES = ["--object", "A", "--object", "B"]
@@ -36,15 +37,6 @@ def rich(package, tmp_path_factory):
         obj.data.uv_layers.remove(obj.data.uv_layers["other"])
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "plain.blend"))
     return folder
-
-
-def pixels(path):
-    image = bpy.data.images.load(str(path), check_existing=False)
-    found = np.zeros(len(image.pixels), np.float32)
-    image.pixels.foreach_get(found)
-    shape = (image.size[1], image.size[0], 4)
-    bpy.data.images.remove(image)
-    return found.reshape(shape)[..., :3]
 
 
 def measured(run, path, objects=(), *more):
@@ -89,7 +81,7 @@ def check_charts(charts, figures):
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_every_format_is_measured_and_drawn_as_a_blend_is(run, rich, suffix):
     figures = measured(run, rich / "plain.blend")
-    drawn = pixels(rich / "again.png")
+    drawn = scenes.pixels_of(rich / "again.png")
     out = rich / f"in{suffix}"
     # Nothing moves by that: densities are those that are there.
     status, _, err = run("stack", rich / "plain.blend", "-o", out)
@@ -99,7 +91,7 @@ def test_every_format_is_measured_and_drawn_as_a_blend_is(run, rich, suffix):
         assert found[key] == pytest.approx(figures[key], rel=2e-3, abs=2e-3), key
     if suffix in (".obj", ".ply"):
         return  # Their axes are taken as they are, with Y up.
-    apart = np.abs(pixels(rich / "again.png") - drawn).max(axis=2)
+    apart = np.abs(scenes.pixels_of(rich / "again.png") - drawn).max(axis=2)
     assert (apart > 0.1).mean() < 0.02
 
 

@@ -22,6 +22,8 @@ import solver_runs
 from recorded_calls import Call, leaves, recorded, same
 from scipy.spatial.transform import Rotation
 
+from omt_uv.solver.progress import drain
+
 LAWS = Path(__file__).with_name("laws.tsv")
 FOUND = Path(__file__).with_name("found.tsv")
 FEWER = os.environ.get("OMT_UV_ACCEPT") == "fewer"
@@ -143,7 +145,7 @@ def outcome(call: Call, change=None):
     try:
         result = call.function(*args, **kwargs)
         if inspect.isgenerator(result):
-            result = recorded_calls.drain(result)
+            result = drain(result)
     except Exception:  # noqa: BLE001, whatever it is, there is no law
         return None
     told = [result, args] if result is None else [result]
@@ -344,5 +346,5 @@ def test_what_is_found_is_that_of_the_table():
     if FEWER:
         FOUND.write_text("".join(f"{line}\n" for line in told if line not in other))
         return
-    other = [f"{line} is now {rows.get(line.split(chr(9))[0])}" for line in other]
-    assert not other, "\n".join([*other, "OMT_UV_ACCEPT=1 accepts this"])
+    now = [f"{line} is now {rows.get(line.split()[0])}" for line in other]
+    assert not other, "\n".join([*now, "OMT_UV_ACCEPT=1 accepts this"])

@@ -16,7 +16,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from omt_uv import solver
-from omt_uv.solver.progress import drain
 
 LARGEST = 400_000
 
@@ -28,12 +27,6 @@ class Call(NamedTuple):
     function: Callable
     args: tuple
     kwargs: dict
-
-    def again(self, args: tuple | None = None, kwargs: dict | None = None) -> Any:
-        """The result of the same call, or of one with other arguments, on copies of them; solvers are drained."""
-        args, kwargs = copied((self.args if args is None else args, self.kwargs if kwargs is None else kwargs))
-        found = self.function(*args, **kwargs)
-        return drain(found) if inspect.isgenerator(found) else found
 
 
 def copied(value):

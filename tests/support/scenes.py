@@ -167,6 +167,15 @@ def state(obj, leave_out=()):
         bpy.data.meshes.remove(mesh)
 
 
+def pixels_of(path) -> np.ndarray:
+    """Colours (h,w,3) of a picture in a file, from 0 to 1, the row at the top first."""
+    image = bpy.data.images.load(str(path), check_existing=False)
+    width, height = image.size
+    found = np.array(image.pixels[:]).reshape(height, width, -1)[::-1, :, :3]
+    bpy.data.images.remove(image)
+    return found
+
+
 def triangles_of(obj):
     """Positions (m,3,3) with the object's matrix, and UVs (m,3,2), of the loop triangles."""
     uv = uv_of(obj).astype(float)

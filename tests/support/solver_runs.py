@@ -35,6 +35,7 @@ from omt_uv.solver.registration.register import register
 from omt_uv.solver.seams import limbs, parting
 from omt_uv.solver.signatures import embedding, marked, reference, signature, wasserstein
 from omt_uv.solver.sphere import dominitz_tannenbaum, moser_flow, multilevel
+from omt_uv.solver.strain import beltrami
 from omt_uv.solver.subdivision import cage_refinement, catmull_clark, modifier
 from omt_uv.solver.transport import (
     ConvexPolygon,
@@ -171,7 +172,7 @@ def _compared():
 def _told_apart():
     V, F = curved()
     image = V * [1.2, 0.9, 0.7] + 0.1 * V[:, [1, 2, 0]] ** 2
-    found = strain.beltrami.beltrami(V, F, image)
+    found = beltrami.beltrami(V, F, image)
     found.histogram()
     strain.corner_beltrami(V[F], image[F])
     weights = {"left": ramp(V, F, 0, 1), "right": 1 - ramp(V, F, 0, 1)}
@@ -190,27 +191,18 @@ def _read_off():
     density.painted_density(near_middle(V, F), 3.0)
     saliency.saliency(V, F)
     analysis.sharp_edges(V, F, np.radians(8))
-    for which in ("gaussian", "saliency", "mean", "distance", "GAUSSIAN", "MEAN", "DISTANCE", "SALIENCY"):
-        call(vertex_scores.vertex_score, which, V, F, np.arange(len(V)) < 4)
+    for kind in vertex_scores.KINDS:
+        vertex_scores.vertex_score(kind, V, F, np.arange(len(V)) < 4)
     face_distortion(V, F, _flat_curved()[F])
     omt.distortion(V, F, _flat_curved()[F])
     overlap.covered_share(_flat_curved() @ [1, 1j], F)
-    call(local_untangle.straighten_folds, F, folded() @ [1, 1j], np.ones(len(F)))
+    local_untangle.straighten_folds(F, folded()[F].reshape(-1, 2), np.ones(len(F)))
     V2, F2 = curved(4)
     loop = np.array([0, 1, 2, 3, 4, 9, 14, 19, 24, 23, 22, 21, 20, 15, 10, 5])
     flat = V2[:, :2].copy()
     flat[12] += [0.5, 0.1]
     untangle.untangle(flat, V2, F2, loop, flat[loop])
-    call(development.developed, V2, F2)
-
-
-def call(function, *args):
-    """Call a function of a folder that may ask for other arguments than these."""
-    try:
-        found = function(*args)
-        return drain(found) if hasattr(found, "send") else found
-    except (TypeError, ValueError, AttributeError, KeyError, IndexError):
-        return None
+    development.developed(V2, F2)
 
 
 def folded():
@@ -316,8 +308,9 @@ def _named():
         corners = None if kind in ("free", "disk") else loop
         mass = face_areas(V, F) * ramp(V, F, 1, 2)
         problem = named_maps.NamedProblem(V, F, mass, kind, corners, 1.3 if kind == "rectangle" else 0.0)
-        for function in (named_maps.conformal_map, named_maps.polar_map):
-            call(function, problem)
+        drain(named_maps.conformal_map(problem))
+        if kind != "free":
+            drain(named_maps.polar_map(problem))
     rectangles.natural_aspect(V, F, loop)
     drain(disk_map.conformal_rectangle(V, F, loop))
     drain(disk_map.conformal_disk(V, F))
@@ -394,10 +387,10 @@ def _upright():
     upright_maps.turn_upright([chart, chart], [turned, 2 * turned], [[0.1, 1.0, 0.2], [0, 0, 1.0]])
     drain(batch_refine.refine_batch([(V, F), (0.5 * V[:, [1, 0, 2]], F[:, ::-1])], "standard", 0.1))
     drain(vertex_sweeps.smoothed_uv(V, F, face_areas(V, F) * ramp(V, F, 1, 2), uv, 3.0, 2))
-    call(parting.parted, chart, uv, np.ones(len(V)))
-    call(limbs.in_pieces, chart, uv, np.ones(len(V)), 3)
-    call(mirror_symmetry.mirror_symmetry, np.arange(len(V))[::-1], 1.0, turned @ [1, 1j])
-    call(additive_schwarz.schwarz_solver, V, F)
+    parting.parted(chart, uv, np.ones(len(V)))
+    limbs.in_pieces(chart, uv, np.ones(len(V)), 3)
+    mirror_symmetry.mirror_symmetry(np.arange(len(V))[None, ::-1], 1.0, turned @ [1, 1j])
+    additive_schwarz.schwarz_solver(V, F)
 
 
 def surface_of(V, F):

@@ -11,17 +11,11 @@ import pytest
 import scenes
 
 
-def pixels(path):
-    image = bpy.data.images.load(str(path))
-    width, height = image.size
-    return np.array(image.pixels[:]).reshape(height, width, 4)[::-1, :, :3]
-
-
 @pytest.mark.parametrize(("kind", "colours"), [("checker", 100), ("circles", 100), ("world", 15)])
 def test_patterns_need_no_mesh(run, tmp_path, kind, colours):
     status, _, err = run("test-texture", "-", "-o", tmp_path / "p.png", "--kind", kind, "--size", 256)
     assert status == 0, err
-    shown = pixels(tmp_path / "p.png")
+    shown = scenes.pixels_of(tmp_path / "p.png")
     assert shown.shape[1] == 256 and len(np.unique((shown * 32).round().reshape(-1, 3), axis=0)) > colours
 
 
@@ -31,7 +25,7 @@ def test_layouts_cover_what_the_uvs_cover(run, tmp_path, kind):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     files = (tmp_path / "in.blend", "-o", tmp_path / "p.png", "--kind", kind, "--size", 64)
     assert run("test-texture", *files)[0] == 0
-    drawn = (pixels(tmp_path / "p.png") < 0.99).any(axis=2)
+    drawn = (scenes.pixels_of(tmp_path / "p.png") < 0.99).any(axis=2)
     area = np.abs(scenes.areas(bpy.data.objects["Bump"])[1]).sum()
     assert drawn.mean() == pytest.approx(area, abs=0.03)
     assert run("test-texture", tmp_path / "in.blend", "-o", tmp_path / "p.jpg")[0] == 1
@@ -49,7 +43,7 @@ def test_diagrams_have_a_cell_for_every_vertex(run, tmp_path, domain):
     assert status == 0 and figures["cells"] == 63 and figures["residual"] < 1e-6, err
     assert sum(line.startswith("f ") for line in (tmp_path / "d.obj").read_text().splitlines()) == 63
     assert run(*files, "-o", tmp_path / "d.png", "--size", 64)[0] == 0
-    assert (pixels(tmp_path / "d.png") < 0.99).any(axis=2).mean() > 0.6
+    assert (scenes.pixels_of(tmp_path / "d.png") < 0.99).any(axis=2).mean() > 0.6
     assert run(*files, "-o", tmp_path / "d.xyz")[0] == 1
 
 

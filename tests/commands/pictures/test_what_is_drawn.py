@@ -38,12 +38,7 @@ TESTED = {(name, "preview"): "here" for name in PREVIEWS} | {
 
 def pixels(path) -> np.ndarray:
     """Bytes (h,w,3), top row first."""
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"
-    width, height = image.size
-    found = np.array(image.pixels[:]).reshape(height, width, -1)[::-1, :, :3]
-    bpy.data.images.remove(image)
-    return np.rint(255 * found).astype(int)
+    return np.rint(255 * scenes.pixels_of(path)).astype(int)
 
 
 def triangles_of(path, key: str) -> np.ndarray:
