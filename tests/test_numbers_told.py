@@ -1,0 +1,67 @@
+"""How numbers stand in what is told, in every text of the package: one thing is one and several are several, and what
+stands before a percent sign is a hundred times a share."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted((ROOT / "omt_uv").rglob("*.py"))
+COUNTING = {"counted", "plural"}
+# Words of one thing, and those of several.
+SEVERAL = {"is": "are", "has": "have", "was": "were", "its": "their", "vertex": "vertices", "a": "{}", "an": "{}",
+           "1": "{}", "another": "others"}  # fmt: skip
+# Where the number is a text of its own, or a percentile, by the name that it has.
+PERCENTS = {"sums", "mean", "deviation", "p"}
+
+
+def texts():
+    """Every call that counts: the file, the line, and both texts."""
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            name = getattr(node, "func", None) and getattr(node.func, "id", getattr(node.func, "attr", ""))
+            if name in COUNTING and all(isinstance(a, ast.Constant) for a in node.args[1:3]) and len(node.args) > 2:
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", node.args[1].value, node.args[2].value
+
+
+def one_of(word):
+    """What a word of several things may be of one: verbs lose their s, and names get one."""
+    return {word, f"{word}s", word.removesuffix("s"), *(one for one, many in SEVERAL.items() if many == word)}
+
+
+@pytest.mark.parametrize("where, one, many", list(texts()))
+def test_one_thing_is_one_and_several_are_several(where, one, many):
+    first, second = (re.findall(r"[\w{}]+", text.lower()) for text in (one, many))
+    # Words that both have in common say nothing; what is left has to agree, and a name or a verb says which is which.
+    left, right = ([w for w in words if w not in others] for words, others in ((first, second), (second, first)))
+    # A verb alone stands behind a number that is told without it.
+    assert left and right and ("{}" in second or len(second) == 1), where
+    pairs = [(a, b) for b in right for a in left if a != b and a in one_of(b)]
+    verbs = {"stay", "lie", "look", "keep", "fold"}
+    assert any(SEVERAL.get(a) == b or (b == f"{a}s" and a not in verbs) or (a == f"{b}s" and b in verbs)
+               for a, b in pairs), (where, left, right)  # fmt: skip
+    assert not any(SEVERAL.get(b) == a or (a == f"{b}s" and b not in verbs) for a, b in pairs), (where, left, right)
+
+
+def percents():
+    """Numbers that stand before a percent sign: the place, and what is written there."""
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                for value, after in zip(node.values, node.values[1:], strict=False):
+                    if (
+                        isinstance(value, ast.FormattedValue)
+                        and isinstance(after, ast.Constant)
+                        and re.match(r" ?%", after.value)
+                    ):
+                        yield f"{path.relative_to(ROOT)}:{node.lineno}", value.value
+
+
+@pytest.mark.parametrize("where, number", [pytest.param(*pair, id=pair[0]) for pair in percents()])
+def test_what_stands_before_a_percent_sign_is_a_hundred_times_a_share(where, number):
+    text = ast.unparse(number)
+    assert text.startswith("100 * ") or text in PERCENTS, (where, text)
