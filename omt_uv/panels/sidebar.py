@@ -81,11 +81,13 @@ class UV_MT_omt_presets(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         from ..session.presets import files
 
-        for operator in filter(class_of, WITH_PRESETS):
-            for path in files(operator):
+        every = ((operator, files(operator)) for operator in filter(class_of, WITH_PRESETS))
+        for k, (operator, paths) in enumerate((operator, paths) for operator, paths in every if paths):
+            if k:
+                self.layout.separator()
+            for path in paths:
                 entry = self.layout.operator("uv.omt_preset", text=path.stem.replace("_", " "), translate=False)
                 entry.operator, entry.filepath = operator, str(path)
-            self.layout.separator()
 
 
 def _panels() -> list[type]:
