@@ -204,3 +204,25 @@ def test_parts_have_manifests_of_their_own_that_are_read_as_one(package, work, t
     assert module.rows_of(module.found_beside(tmp_path / "out")) == []
     with pytest.raises(package("batch.plan").BatchError, match="no such manifest"):
         module.found_beside(tmp_path / "other")
+
+
+def test_the_bar_is_told_of_every_run_with_its_work_and_whether_it_failed(go, work, monkeypatch):
+    from contextlib import contextmanager
+
+    from omt_uv.batch import bar, engine
+
+    told, begun = [], []
+
+    @contextmanager
+    def shown(count, whole):
+        begun.append((count, whole))
+        yield lambda part, failed: told.append((part, failed))
+
+    monkeypatch.setattr(engine, "shown", shown)
+    sizes = {"a.obj": 40, "bad.obj": 7, "crash.obj": 300, "b.obj": 0}
+    for name, size in sizes.items():
+        work.put(name, text=b"x" * size)
+    go()
+    parts = {name: bar.work_of(size + len(name)) for name, size in sizes.items()}
+    assert begun == [(4, sum(parts.values()))]
+    assert sorted(told) == sorted((part, name in ("bad.obj", "crash.obj")) for name, part in parts.items())
