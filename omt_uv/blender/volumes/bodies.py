@@ -26,7 +26,7 @@ def read_body(obj: bpy.types.Object, keep: str = "") -> FlowBody:
 
     Raises
     ------
-    NonFiniteError : the transformation of the object cannot be undone
+    NonFiniteError : a coordinate is none, or the transformation of the object cannot be undone
     TargetError : what is written to it would not be saved
     """
     check_local(obj)
@@ -48,6 +48,9 @@ def read_body(obj: bpy.types.Object, keep: str = "") -> FlowBody:
         if copy is not None:
             bpy.data.meshes.remove(copy)
     world = positions.reshape(-1, 3).astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
+    wrong = np.flatnonzero(~np.isfinite(world).all(axis=1))
+    if len(wrong):
+        raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
     faces = triangles.reshape(-1, 3).astype(np.int64)
     # A mirrored object shows its faces from the other side.
     faces = faces if np.linalg.det(matrix[:3, :3]) > 0 else faces[:, ::-1]

@@ -60,7 +60,7 @@ def run_flow(options: argparse.Namespace) -> None:
     objects = [obj for obj in everything if obj.name != options.inside]
     if not objects:
         raise CommandError(f"{options.input}: only the wall {options.inside} is there, and nothing that could flow.")
-    with refusals(name=objects[0].name):
+    with refusals(name=objects[0].name if len(objects) == 1 else str(options.input)):
         found = _flow(options, file, objects)
     for k, obj in enumerate(objects):
         if keyed:
@@ -80,12 +80,15 @@ def _flow(options: argparse.Namespace, file, objects: list):
     from ...solver.flows.options import FlowOptions
 
     keep = options.keep or (file.keep[0] if file.keep else "")
-    bodies = tuple(read_body(obj, keep) for obj in objects)
+    bodies: list = []
+    for obj in objects:
+        with refusals(name=obj.name):
+            bodies.append(read_body(obj, keep))
     check_keep(objects, keep)
     handles = handles_of(file, bodies, lambda k, group: _rows(members(objects[k], group)))
     radius = options.radius if options.sharpness is None else options.sharpness**-0.5
     flowing = FlowOptions(radius=radius, path=options.path, samples=options.samples)
-    return drain_shown(flow_bodies(FlowJob(bodies, handles, flowing, _domain(options, bodies), options.frames)))
+    return drain_shown(flow_bodies(FlowJob(tuple(bodies), handles, flowing, _domain(options, bodies), options.frames)))
 
 
 def _rows(inside):
