@@ -90,6 +90,21 @@ def refusals(objects: Sequence = (), name: str = "", others: tuple[type[Exceptio
         raise CommandError(str(error)) from error
 
 
+@contextmanager
+def blaming(pairs: list) -> Iterator[None]:
+    """Name the first object, of pairs of object and Reading that a block measures as one, that has no measure."""
+    from ..pipelines.distortion import measure_readings
+    from ..solver.errors import MeshError
+
+    try:
+        yield
+    except MeshError:
+        for obj, reading in pairs:
+            with refusals(name=obj.name):
+                measure_readings([reading])
+        raise
+
+
 def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = None) -> None:
     """Refuse what cannot be written before the long work: all files of the options, and whatever names one twice.
 

@@ -8,7 +8,17 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .common import CommandError, UsageError, check_paths, refusals, require_blender, warn, write_picture, write_preview
+from .common import (
+    CommandError,
+    UsageError,
+    blaming,
+    check_paths,
+    refusals,
+    require_blender,
+    warn,
+    write_picture,
+    write_preview,
+)
 from .options import add_input, add_preview, texture_size
 from .selection import read_file
 
@@ -65,7 +75,8 @@ def run(options: argparse.Namespace) -> None:
         pairs = read_file(options)
         readings = [reading for _, reading in pairs]
         strain = _strain(pairs, options) if options.beltrami else ""
-        figures = None if options.beltrami else measure_readings(readings)
+        with blaming(pairs):
+            figures = None if options.beltrami else measure_readings(readings)
         if options.histogram:
             from ..display.histogram import histogram
 
@@ -124,7 +135,10 @@ def _strain(pairs: list, options: argparse.Namespace) -> str:
     from ..blender.shapes.strain import strain_rows
     from ..pipelines.shapes.strain import strain_report
 
-    found = {obj.name: strain_report(strain_rows(obj, reading, options.shape_key)) for obj, reading in pairs}
+    found = {}
+    for obj, reading in pairs:
+        with refusals(name=obj.name):
+            found[obj.name] = strain_report(strain_rows(obj, reading, options.shape_key))
     if options.json:
         return json.dumps(found, indent=1)
     return "\n".join(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..common import CommandError, check_paths, place_objects, require_blender, write_picture
+from ..common import CommandError, blaming, check_paths, place_objects, require_blender, write_picture
 from ..options import add_input, texture_size
 from ..selection import read_file
 
@@ -48,4 +48,5 @@ def drawn(options: argparse.Namespace):
     bare = [obj.name for obj, reading in pairs if reading.uv is None]
     if bare:
         raise CommandError(f"{', '.join(bare)}: There are no UVs to draw. Unwrap the mesh first.")
-    return layout_picture(place_objects(options, pairs), options.kind, options.size)
+    with blaming(pairs):
+        return layout_picture(place_objects(options, pairs), options.kind, options.size)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...pipelines.distortion import triangles_of
 from ...pipelines.measuring.diagrams import Diagram
 from ...solver.maps.distortion import face_distortion
 from ..colormaps import area_colours, shear_colours
@@ -24,27 +25,25 @@ LINE = 1.2
 
 
 def layout_picture(objects: Sequence[Placed], kind: str, size: int) -> np.ndarray:
-    """The layout (size,size,3) in [0,1], top row first, of "area", "shear" or "normals"; all objects need UVs."""
-    uv, colour = [], []
-    for item in objects:
-        reading = item.reading
-        surface = reading.surface
-        chosen = reading.faces[surface.triangle_face]
-        corners = surface.triangles[chosen]
-        triangles = surface.corner_vertex[corners]
-        mapped = np.asarray(reading.uv, float)[corners]
-        uv.append(mapped)
-        if kind == "normals":
-            colour.append(_lit(surface.positions @ item.rotation.T, triangles)[triangles])
-        else:
-            octaves, shear, *_ = face_distortion(surface.positions, triangles, mapped, surface.triangle_face[chosen])
-            tints = area_colours(octaves) if kind == "area" else shear_colours(shear)
-            colour.append(np.repeat(tints[:, None], 3, axis=1))
-    corner = np.concatenate(uv) * [1, -1] + [0, 1]
+    """The layout (size,size,3) in [0,1], top row first, of "area", "shear" or "normals"; all objects need UVs. They
+    share a texture, so one scale of areas holds for all.
+
+    Raises
+    ------
+    MeshError : there is no face, or, but for normals, see `solver.maps.distortion.distortion`
+    """
+    found = triangles_of([item.reading for item in objects])
+    if kind == "normals":
+        colours = np.concatenate([_lit_faces(item) for item in objects])
+    else:
+        octaves, shear = face_distortion(found.positions, found.triangles, found.uv, found.polygons)
+        tints = area_colours(octaves) if kind == "area" else shear_colours(shear)
+        colours = np.repeat(tints[:, None], 3, axis=1)
+    corner = found.uv * [1, -1] + [0, 1]
     wide = size * SAMPLES
-    found = cover(corner * wide, np.zeros(corner.shape[:2]), (wide, wide))
-    shown = (found.weights[:, :, None] * np.concatenate(colour)[found.triangles]).sum(axis=1)
-    return _averaged(found.pixels, shown, size)
+    covered = cover(corner * wide, np.zeros(corner.shape[:2]), (wide, wide))
+    shown = (covered.weights[:, :, None] * colours[covered.triangles]).sum(axis=1)
+    return _averaged(covered.pixels, shown, size)
 
 
 def cells_picture(diagram: Diagram, size: int) -> np.ndarray:
@@ -65,6 +64,13 @@ def cells_picture(diagram: Diagram, size: int) -> np.ndarray:
     distance = np.where(real[found.triangles], edge_distances(corner[triangles], found), np.inf).min(axis=1)
     strength = np.clip(LINE * SAMPLES / 2 + 0.5 - distance, 0, 1)[:, None]
     return _averaged(found.pixels, colour + strength * (INK - colour), size)
+
+
+def _lit_faces(item: Placed) -> np.ndarray:
+    """Brightness (m,3,3) of the corners of the chosen triangles of an object as it stands in the world."""
+    surface = item.reading.surface
+    triangles = surface.corner_vertex[surface.triangles[item.reading.faces[surface.triangle_face]]]
+    return _lit(surface.positions @ item.rotation.T, triangles)[triangles]
 
 
 def _lit(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from bpy.props import EnumProperty, IntProperty
 from ...session import run
 from ...session.language import counted
 from ...settings import DOMAINS
-from ..base import Complaint, QuickOperator, SolverOperator, complaints, read_objects
+from ..base import Complaint, QuickOperator, SolverOperator, blaming, complaints, read_objects
 
 KINDS = (
     ("AREA", "Area", "Every face in the colour of its area: blue has too little of the texture, red too much"),
@@ -41,7 +41,9 @@ class UV_OT_omt_layout_image(QuickOperator, bpy.types.Operator):
         if bare:
             raise Complaint(f"{', '.join(bare)}: There are no UVs to draw. Unwrap the mesh first.")
         placed = [Placed(reading, *place_of(obj)) for obj, reading in pairs]
-        image = show(NAME, layout_picture(placed, self.kind.lower(), self.size))
+        with blaming(pairs):
+            picture = layout_picture(placed, self.kind.lower(), self.size)
+        image = show(NAME, picture)
         self.report({"INFO"}, f"The image {image.name!r} shows the layout")
 
 
