@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ...session.language import counted, words
 from ...settings import DEFAULT_TEXTURE_SIZE
-from ..base import Complaint, QuickOperator, check_all_local, complaints, read_objects
+from ..base import Complaint, QuickOperator, blaming, check_all_local, complaints, read_objects
 
 KINDS = (
     ("GROUPS", "Vertex Groups", "Faces whose vertices have a mean weight of a half and more"),
@@ -42,7 +42,7 @@ class UV_OT_omt_regions(QuickOperator, bpy.types.Operator):
             raise Complaint("No attribute is named. Choose one of whole numbers or truth values on faces.")
         pairs = read_objects(context)
         kind = self.attribute if self.kind == "ATTRIBUTE" else self.kind.lower()
-        with complaints():
+        with complaints(), blaming(pairs):
             rows = figures_by_region([r for _, r in pairs], regions_of(pairs, kind), self.texture_size)
         context.window_manager.clipboard = table_text(rows, "\t")
         text = counted(len(rows) - 1, "{} region measured", "{} regions measured")

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty
 
 from ...session.language import counted
-from ..base import Complaint, QuickOperator, check_all_local, read_objects
+from ..base import Complaint, QuickOperator, blaming, check_all_local, read_objects
 
 FIGURES = (
     ("AREA", "Area", "Faces whose share of the texture is farthest from what is due to them"),
@@ -40,7 +40,8 @@ class UV_OT_omt_worst(QuickOperator, bpy.types.Operator):
         # What was selected before does not narrow the search: the next click finds the same faces.
         pairs = read_objects(context) if context.mode == "OBJECT" else _whole(context)
         check_all_local(pairs)
-        found = worst_faces([reading for _, reading in pairs], self.figure, self.share / 100)
+        with blaming(pairs):
+            found = worst_faces([reading for _, reading in pairs], self.figure, self.share / 100)
         count = sum(map(len, found))
         if not count:
             raise Complaint("No face is folded." if self.figure == "FOLDS" else "No face stands out.")

@@ -6,7 +6,8 @@ from dataclasses import asdict
 
 import numpy as np
 
-from ...solver.mesh.surface import Surface
+from ...solver.errors import NonFiniteError
+from ...solver.mesh.surface import Surface, check_finite
 from ...solver.strain.beltrami import Beltrami, corner_beltrami
 from ...solver.strain.regions import RegionStrain
 
@@ -17,13 +18,22 @@ def strain_of(surface: Surface, uv: np.ndarray | None = None, shape: np.ndarray 
     Raises
     ------
     ValueError : neither or both are given
+    NonFiniteError : a coordinate of a face, of its shape or a UV is none; elements are vertices, or polygons
     """
     if (uv is None) == (shape is None):
         raise ValueError("strain is that of UVs or of a shape")
-    corners = surface.positions[surface.corner_vertex[surface.triangles]]
+    triangles = surface.corner_vertex[surface.triangles]
+    check_finite(surface.positions, triangles)
+    corners = surface.positions[triangles]
     if uv is not None:
-        return corner_beltrami(corners, np.asarray(uv, float)[surface.triangles])
-    return corner_beltrami(corners, np.asarray(shape, float)[surface.corner_vertex[surface.triangles]])
+        mapped = np.asarray(uv, float)[surface.triangles]
+        wrong = np.unique(surface.triangle_face[~np.isfinite(mapped).all(axis=(1, 2))])
+        if len(wrong):
+            raise NonFiniteError("A UV is not a finite number", "Unwrap these faces anew first", "face", wrong)
+        return corner_beltrami(corners, mapped)
+    image = np.asarray(shape, float)
+    check_finite(image, triangles)
+    return corner_beltrami(corners, image[triangles])
 
 
 def of_polygons(found: Beltrami, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
