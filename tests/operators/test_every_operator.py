@@ -50,6 +50,8 @@ def test_every_choice_has_a_number_a_word_and_a_default_of_its_own(package):
         items, name = list(prop.enum_items), f"{owner.identifier}.{prop.identifier}"
         assert len({i.value for i in items}) == len(items) == len({i.identifier for i in items}), name
         assert len({i.name for i in items}) == len(items), name
+        # None is told as another one is.
+        assert all(i.description for i in items) and len({i.description for i in items}) == len(items), name
         assert prop.is_enum_flag or prop.default in {i.identifier for i in items}, name
 
 

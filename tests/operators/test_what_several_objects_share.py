@@ -15,9 +15,13 @@ from operator_runs import RUNS
 
 ARRANGING = {"stack": ("uv.omt_stack", {}, "UVMap"), "symmetrize": ("uv.omt_symmetrize", {}, "UVMap"),
              "rectify": ("uv.omt_rectify", {}, "UVMap")}  # fmt: skip
-# What writes nothing.
+# Those that measure, and bodies that flow or are filled.
 MEASURING = {"measure": ("uv.omt_measure", {}, ""), "histogram": ("uv.omt_histogram", {}, ""),
-             "get": ("uv.omt_density_get", {}, "")}  # fmt: skip
+             "get": ("uv.omt_density_get", {}, ""),
+             "layout": ("uv.omt_layout_image", {"kind": "SHEAR", "size": 32}, ""),
+             "worst": ("uv.omt_worst", {}, ""), "regions": ("uv.omt_regions", {}, ""),
+             "strain": ("object.omt_strain", {"of": "UV"}, ""), "flow": ("object.omt_flow", {"move": (0, 0, 0.1)}, ""),
+             "volume": ("object.omt_volume", {"tets": 100}, "")}  # fmt: skip
 EVERY = RUNS | ARRANGING | MEASURING
 # Of UVs alone.
 NOT_OF_ONE = {"push"}

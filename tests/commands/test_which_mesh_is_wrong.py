@@ -1,0 +1,86 @@
+"""Of several meshes of a file the one that is wrong is named, by every command, wherever it stands: what lacks UVs that
+are needed, and what has a coordinate that is no number, by its own number; and nothing is written."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import bpy
+
+import command_runs
+import pytest
+from command_runs import contents
+
+NAMES = ("First", "Second", "Third")
+# Commands that need UVs.
+OF_UVS = {
+    "refine": "-o @out --quality draft",
+    "magnify": "-o @out --quality draft --weights region --factor 1.5 --source uv",
+    "measure": "--json",
+    "measure strain": "--json --beltrami",
+    "stack": "-o @out",
+    "symmetrize": "-o @out",
+    "rectify": "-o @out",
+    "test-texture area": "-o @picture --kind area --size 32",
+    "test-texture normals": "-o @picture --kind normals --size 32",
+}
+EVERY = OF_UVS | {
+    "unwrap": "-o @out --quality draft",
+    "sphere": "-o @out --quality draft",
+    "seams": "-o @out",
+    "weights": "-o @out --kind gaussian",
+    "remesh": "-o @out --vertices 40",
+    "partition": "-o @out --cells 3 --relax 0",
+    "volume": "-o @out --tets 100",
+    "flow": "-o @out --handles @handles",
+}
+# It looks at UVs, and lights faces by what normals there are.
+WITHOUT = {"test-texture normals"}
+
+
+@pytest.fixture(scope="module")
+def folder(package, tmp_path_factory):
+    """Files of three meshes, of which some are wrong, called by what is wrong with which."""
+    made = tmp_path_factory.mktemp("wrong")
+    for kind, wrong in [*(("bare", names) for names in ([0], [1], [1, 2])), *(("nan", [k]) for k in range(3))]:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        for k, name in enumerate(NAMES):
+            obj = command_runs.body(name, at=4.0 * k, seed=k + 1)
+            if k in wrong and kind == "bare":
+                obj.data.uv_layers.remove(obj.data.uv_layers.active)
+            if k in wrong and kind == "nan":
+                obj.data.vertices[5].co.y = float("nan")
+        bpy.ops.wm.save_as_mainfile(filepath=str(made / f"{kind}{''.join(map(str, wrong))}.blend"))
+    (made / "handles.json").write_text(json.dumps([{"object": "First", "vertices": [0], "move": [0, 0, 0.1]}]))
+    return made
+
+
+def refused(run, folder, name, file):
+    """What is told of the meshes of a file, without its name."""
+    files = {"@out": "out.blend", "@picture": "out.png", "@handles": "handles.json"}
+    words = [folder / files[word] if word in files else word for word in EVERY[name].split()]
+    before = contents(folder)
+    status, out, err = run(name.split()[0], folder / file, *words)
+    assert (status, out) == (1, "") and len(err.splitlines()) == 1, err
+    assert contents(folder) == before
+    return err.replace(str(folder / file), "")
+
+
+@pytest.mark.parametrize("name", OF_UVS)
+@pytest.mark.parametrize("wrong", [[0], [1], [1, 2]], ids=str)
+def test_meshes_without_uvs_are_named_and_nothing_is_written(run, folder, name, wrong):
+    message = refused(run, folder, name, f"bare{''.join(map(str, wrong))}.blend")
+    named = {k for k, word in enumerate(NAMES) if word in message}
+    # One that is wrong is enough; none is named that is not.
+    assert named and named <= set(wrong) and re.search("no UV", message) and "nwrap" in message, message
+
+
+@pytest.mark.parametrize("name", sorted(EVERY.keys() - WITHOUT))
+@pytest.mark.parametrize("wrong", [0, 1, 2])
+def test_a_mesh_with_a_coordinate_that_is_none_is_named_with_its_own_number(run, folder, name, wrong):
+    if name == "volume":
+        pytest.importorskip("tetgen")
+    message = refused(run, folder, name, f"nan{wrong}.blend")
+    assert [word for word in NAMES if word in message] == [NAMES[wrong]], message
+    assert "(1 vertex: 5)" in message
