@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import os
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -104,12 +104,10 @@ def test_paths_are_as_long_as_blender_holds(monkeypatch, more):
 @pytest.mark.parametrize("over", [-60, 60])
 def test_what_is_left_behind_goes_once_it_is_old(tmp_path, monkeypatch, locks, bound, over):
     """Of a process that lives: only its age tells."""
-    import os
-
     path = tmp_path / f"{verified.PREFIX}{os.getpid()}_x.obj"
     path.write_bytes(b"")
     age = getattr(verified, bound) + over
-    os.utime(path, (time.time() - age,) * 2)
+    os.utime(path, (path.stat().st_mtime - age,) * 2)
     if not locks:
         monkeypatch.setattr(verified, "fcntl", None)
     assert verified._is_abandoned(path, tmp_path / "none") == (over > 0)
