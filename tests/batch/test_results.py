@@ -121,6 +121,20 @@ def test_no_name_of_a_file_ends_or_begins_an_element_of_the_page_and_each_is_rea
     assert table["title"] == name and table["words"] == [name] and table["rows"][0][0] == name
 
 
+@pytest.mark.parametrize(
+    "value, shown", [("NaN", None), ("Infinity", None), ("-Infinity", None), ("1.23456789", 1.23457)]
+)
+def test_a_figure_that_is_no_number_is_none_on_the_page(package, tmp_path, value, shown):
+    """JSON has no word for it, and a browser would show nothing of the page."""
+    pages, template = package("batch.pages"), package("batch.page_text").PAGE
+    rows = [row("a.obj", report=f'{{"rms": {value}, "faces": 3}}'), row("b.obj", report='{"rms": 0.5, "faces": 4}')]
+    begin, end = template.split("DATA_OF_THE_BATCH")
+    text = pages.page_of(rows, tmp_path, "one")[len(begin) : -len(end)]
+    table = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    place = table["columns"].index("rms")
+    assert [line[place] for line in table["rows"]] == [shown, 0.5]
+
+
 # ---- the page, in a browser ---------------------------------------------------------------------------------
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -139,3 +139,22 @@ def test_up_in_files_becomes_up_in_the_world(package):
     assert np.linalg.det(turn) == pytest.approx(1)
     np.testing.assert_array_equal(turn @ [1, 0, 0], [1, 0, 0])
     assert (turn @ [0, 1, 0]).tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize("name, up", [("a.obj", "Y"), ("a.OFF", "Y"), ("a.ply", "Y"), ("a.blend", "Z"), ("a.glb", "Z")])
+def test_objects_of_files_stand_as_their_axes_say_and_where_they_are(package, name, up):
+    """A picture is of them upright: turned as a whole, places and all."""
+    from pathlib import Path
+
+    import scenes
+    from mathutils import Matrix
+
+    common, mesh = package("commands.common"), package("blender.mesh")
+    obj = scenes.bump(2, 2, offset=0.3)
+    obj.matrix_world = Matrix.LocRotScale((1.0, 2.0, -3.0), Matrix.Rotation(0.7, 3, (0.6, 0.0, 0.8)), (1, 1, 1))
+    reading = mesh.read(obj)
+    (placed,) = common.place_objects(argparse.Namespace(input=Path(name)), [(obj, reading)])
+    world = np.array([obj.matrix_world @ v.co for v in obj.data.vertices])
+    expected = np.stack([world[:, 0], -world[:, 2], world[:, 1]], axis=1) if up == "Y" else world
+    vertex = reading.surface.positions @ placed.rotation.T + placed.shift
+    np.testing.assert_allclose(vertex, expected, atol=1e-5)

@@ -64,7 +64,8 @@ def figures(run, folder, name, scene):
     words = [folder / files[word] if word in files else word for word in TOLD[name][0].split()]
     status, out, err = run(name.split()[0], folder / f"{scene}.blend", *words)
     assert status == 0, err
-    return json.loads((folder / "report.json").read_text() if "@report" in TOLD[name][0] else out)
+    text = (folder / "report.json").read_text() if "@report" in TOLD[name][0] else out
+    return json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
 
 
 def apart(one, other, bound, path=""):

@@ -54,3 +54,29 @@ def test_what_was_chosen_meanwhile_and_views_of_later_stay_as_they_are(shading):
     first.shading.color_type = "TEXTURE"
     shading.hide_textures(window(first))
     assert first.shading.color_type == "TEXTURE"
+
+
+@pytest.mark.parametrize("shown", [["AREA"], ["AREA", "SHEAR"], ["SHEAR", "AREA", "SHEAR"]])
+def test_colours_of_distortion_give_every_view_its_own_shading_back(package, monkeypatch, shown):
+    """However often others are shown meanwhile; a view that was set to something else by hand stays so."""
+    import bpy
+
+    import scenes
+
+    overlay = package("display.overlay")
+    obj = scenes.bump(2, 2)
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    before = [("SOLID", "MATERIAL"), ("SOLID", "VERTEX"), ("RENDERED", "OBJECT"), ("WIREFRAME", "TEXTURE")]
+    views = [view(*kind) for kind in before]
+    later = view("SOLID", "OBJECT")
+    monkeypatch.setattr(overlay, "view_spaces", lambda _: views)
+    try:
+        for kind in shown:
+            assert bpy.ops.uv.omt_overlay(show=kind) == {"FINISHED"}
+            assert {(v.shading.type, v.shading.color_type) for v in views} == {("SOLID", "VERTEX")}
+        views[2].shading.type = "MATERIAL"
+        views.append(later)
+    finally:
+        bpy.ops.uv.omt_overlay(show="NONE")
+    found = [(v.shading.type, v.shading.color_type) for v in views]
+    assert found == [*before[:2], ("MATERIAL", "VERTEX"), before[3], ("SOLID", "OBJECT")]

@@ -140,3 +140,18 @@ def test_gaps_stand_between_things(package):
     assert len(records) > 25 and sum(len(gaps(record)) > 1 for record in records.values()) > 3
     for name, record in records.items():
         assert all(gaps(record)) or not record, name
+
+
+def test_settings_that_are_hidden_are_not_drawn(package):
+    """Of an operator that draws none of its own: all others stand below one another, in their order."""
+    section = package("panels.section")
+    for name in ("wm.omt_help", "uv.omt_flow", "uv.omt_density_set"):
+        properties = bpy.context.window_manager.operator_properties_last(name)
+        every = [p.identifier for p in properties.bl_rna.properties if p.identifier != "rna_type"]
+        hidden = {p.identifier for p in properties.bl_rna.properties if p.is_hidden}
+        record = [text for kind, text, _ in drawn(section.draw_settings, name, properties) if kind == "prop"]
+        assert not hidden & set(record), name
+        if not hasattr(sys.modules[section.class_of(name).__module__], "draw_settings"):
+            assert record == [name for name in every if name not in hidden]
+    help_of = bpy.context.window_manager.operator_properties_last("wm.omt_help").bl_rna.properties
+    assert any(p.is_hidden for p in help_of)
