@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..pipelines.distortion import triangles_of
 from ..pipelines.reading import Reading
 from ..solver.maps.distortion import face_distortion
 from .colormaps import area_colours
@@ -65,12 +66,19 @@ def _drawn(objects: Sequence[Placed]) -> _Drawn:
     """The triangles of all objects."""
     parts = [_of_object(item) for item in objects]
     uvs = [part.uv for part in parts if part.uv is not None]
+    space = np.concatenate([part.space for part in parts])
+    uv = np.concatenate(uvs) if len(uvs) == len(parts) else None
+    octaves = np.zeros(len(space))
+    if uv is not None and np.cross(space[:, 1] - space[:, 0], space[:, 2] - space[:, 0]).any():
+        # They share a texture, so one scale of areas holds for all.
+        found = triangles_of([item.reading for item in objects])
+        octaves = face_distortion(found.positions, found.triangles, found.uv, found.polygons)[0]
     return _Drawn(
-        space=np.concatenate([part.space for part in parts]),
+        space=space,
         normals=np.concatenate([part.normals for part in parts]),
-        uv=np.concatenate(uvs) if len(uvs) == len(parts) else None,
+        uv=uv,
         real=np.concatenate([part.real for part in parts]),
-        octaves=np.concatenate([part.octaves for part in parts]),
+        octaves=octaves,
     )
 
 
@@ -93,10 +101,7 @@ def _of_object(item: Placed) -> _Drawn:
     step = (b - a) % size[:, None]
     real = (step == 1) | (step == size[:, None] - 1)
     uv = None if reading.uv is None else reading.uv[corners].astype(float)
-    octaves = np.zeros(len(corners))
-    if uv is not None and len(uv) and cross.any():
-        octaves = face_distortion(positions, triangles, uv, face)[0]
-    return _Drawn(space, normals[triangles], uv, real, octaves)
+    return _Drawn(space, normals[triangles], uv, real, np.zeros(len(corners)))
 
 
 def _checkered(drawn: _Drawn, tile: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Layouts of several objects show areas by one scale for all of them, as they share a texture."""
+"""Layouts of several objects, and previews, show areas by one scale for all, as they share a texture."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ def test_faces_have_the_colours_of_their_shares_of_all(widths, sides):
     picture = layouts.layout_picture(objects, "area", 64)
     flat, space = np.square(widths), np.square(sides)
     octaves = np.log2(flat / flat.sum() / (space / space.sum()))
+    np.testing.assert_allclose(preview._drawn(objects).octaves, np.repeat(octaves, 2), atol=1e-6)
     for corner, width, expected in zip(corners, widths, colormaps.area_colours(octaves), strict=True):
         u, v = corner + width / 2
         np.testing.assert_allclose(picture[int(64 * (1 - v)), int(64 * u)], expected, atol=1e-6)
