@@ -66,7 +66,8 @@ class MatchResult:
 
     def report(self) -> dict:
         """Figures for a JSON file."""
-        names = [self.landmarks.name(k) for k in range(len(self.landmarks))]
+        # In a file of pairs they have numbers alone.
+        names = [*self.landmarks.names, *map(str, range(len(self.landmarks.names), len(self.landmarks)))]
         stretch = self.found.stretches
         return {
             "domain": self.found.domain,
