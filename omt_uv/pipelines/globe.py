@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..settings import GlobeSettings
-from ..solver.errors import MeshError, plural
+from ..solver.errors import MeshError, ZeroAreaFaceError, plural
 from ..solver.globe.exact_areas import correct_areas, equirectangular_areas
 from ..solver.globe.projections import EQUIRECT
 from ..solver.globe.rotation import MarkerError, along_axes, by_markers
 from ..solver.globe.unfolding import Polygons, gather_polygons, unfold
-from ..solver.mesh.geometry import signed_areas
+from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.gluing import groups
 from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.spherical_geometry import spherical_areas
@@ -204,6 +204,8 @@ def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list
 
 def _globe(component: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
     """Map a component to the sphere, turn it, and lay it out."""
+    if not face_areas(component.vertices, component.triangles).any():
+        raise ZeroAreaFaceError("No face of the part has an area")
     density = None if job.density is None else job.density[component.members]
     fans = component.fans
     beyond = component.faces.max() + 1 + np.arange(len(fans))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.analysis.facing import Z_UP, SceneAxes
-from ..solver.mesh.surface import Surface
+from ..solver.errors import NonFiniteError
+from ..solver.mesh.surface import Surface, check_finite
 from ..solver.parameterization.chart_indices import CornerPins
 from ..solver.subdivision.modifier import SubdivisionModifier
 
@@ -40,3 +41,18 @@ class Reading:
             return None
         pinned = self.pinned & np.repeat(self.faces, np.diff(self.surface.face_start))
         return CornerPins(pinned, self.uv) if pinned.any() else None
+
+
+def check_places(surface: Surface) -> None:
+    """Raise NonFiniteError, with the vertices, where a coordinate of a face is no number."""
+    check_finite(surface.positions, surface.corner_vertex[surface.triangles])
+
+
+def check_uvs(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None) -> None:
+    """Raise NonFiniteError, with the polygons, where a UV (c,2) of the polygons `faces` (f,) bool is no number."""
+    wrong = ~np.isfinite(uv[surface.triangles]).all(axis=(1, 2))
+    if faces is not None:
+        wrong &= faces[surface.triangle_face]
+    if wrong.any():
+        polygons = np.unique(surface.triangle_face[wrong])
+        raise NonFiniteError("A UV is not a finite number", "Unwrap these faces anew first", "face", polygons)

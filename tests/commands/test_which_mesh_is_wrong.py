@@ -9,7 +9,9 @@ import re
 import bpy
 
 import command_runs
+import numpy as np
 import pytest
+import scenes
 from command_runs import contents
 
 NAMES = ("First", "Second", "Third")
@@ -43,7 +45,8 @@ WITHOUT = {"test-texture normals"}
 def folder(package, tmp_path_factory):
     """Files of three meshes, of which some are wrong, called by what is wrong with which."""
     made = tmp_path_factory.mktemp("wrong")
-    for kind, wrong in [*(("bare", names) for names in ([0], [1], [1, 2])), *(("nan", [k]) for k in range(3))]:
+    every = [("bare", names) for names in ([0], [1], [1, 2])] + [("nan", [k]) for k in range(3)]
+    for kind, wrong in [*every, ("flat", [1]), ("loose", [1]), ("strange", [1])]:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         for k, name in enumerate(NAMES):
             obj = command_runs.body(name, at=4.0 * k, seed=k + 1)
@@ -51,6 +54,16 @@ def folder(package, tmp_path_factory):
                 obj.data.uv_layers.remove(obj.data.uv_layers.active)
             if k in wrong and kind == "nan":
                 obj.data.vertices[5].co.y = float("nan")
+            if k in wrong and kind == "flat":
+                obj.data.vertices.foreach_set("co", np.ravel([(v.co.x, 0, 0) for v in obj.data.vertices]))
+            if k in wrong and kind == "loose":
+                mesh = bpy.data.meshes.new("Loose")
+                mesh.from_pydata([v.co[:] for v in obj.data.vertices], [], [])
+                obj.data = mesh
+            if k in wrong and kind == "strange":
+                uv = scenes.uv_of(obj)
+                uv[4] = np.nan
+                scenes.set_uv(obj, uv)
         bpy.ops.wm.save_as_mainfile(filepath=str(made / f"{kind}{''.join(map(str, wrong))}.blend"))
     (made / "handles.json").write_text(json.dumps([{"object": "First", "vertices": [0], "move": [0, 0, 0.1]}]))
     return made
@@ -85,3 +98,15 @@ def test_a_mesh_with_a_coordinate_that_is_none_is_named_with_its_own_number(run,
     message = refused(run, folder, name, f"nan{wrong}.blend")
     assert [word for word in NAMES if word in message] == [NAMES[wrong]], message
     assert "(1 vertex: 5)" in message
+
+
+@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("file", ["flat1", "loose1", "strange1"])
+def test_nothing_that_is_wrong_with_a_mesh_is_a_defect_of_the_program(run, folder, tmp_path, name, file):
+    """It is done, or refused in one line, whatever the figures are then."""
+    if name == "volume":
+        pytest.importorskip("tetgen")
+    files = {"@out": tmp_path / "out.blend", "@picture": tmp_path / "out.png", "@handles": folder / "handles.json"}
+    words = [files.get(word, word) for word in EVERY[name].split()]
+    status, _, err = run(name.split()[0], folder / f"{file}.blend", *words)
+    assert status in (0, 1) and "defect" not in err and "Traceback" not in err, err

@@ -15,7 +15,7 @@ from ...pipelines.shapes.landmark_pairs import Pairs
 from ...pipelines.shapes.match import MatchJob, MatchResult
 from ...solver.analysis.feature_edges import edge_union
 from ...solver.errors import EmptyMeshError
-from ...solver.mesh.surface import Surface
+from ...solver.mesh.surface import Surface, check_finite
 from ...solver.mesh.topology import pair_keys
 from ...solver.registration.results import RegistrationOptions
 from .. import mesh as blender_mesh
@@ -47,10 +47,12 @@ class Carried:
 
 
 def read_carrier(obj: bpy.types.Object) -> Carried:
-    """Read an object in Object Mode; changes nothing. Raises MeshError: no faces, or a scale that flattens it."""
+    """Read an object in Object Mode; changes nothing. Raises MeshError: no faces, coordinates
+    that are no numbers, or a scale that flattens it."""
     reading = blender_mesh.read_mesh(obj.data, obj)
     if not len(reading.surface.triangles):
         raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
+    check_finite(reading.surface.positions, reading.surface.corner_vertex[reading.surface.triangles])
     sides = oriented(reading.surface)
     stretch = blender_mesh.stretch(obj)
     if blender_mesh.is_flattened(stretch):

@@ -25,6 +25,7 @@ class OBJECT_OT_omt_distance(QuickOperator, bpy.types.Operator):
         from ...blender.measuring.distances import NAME, placed_mesh, write_distances
         from ...display import overlay
         from ...display.colormaps import SHEAR_TOP, shear_colours
+        from ...pipelines.reading import check_places
         from ...solver.comparison.comparison_figures import compare, distances_to
         from ...solver.progress import drain
 
@@ -35,6 +36,9 @@ class OBJECT_OT_omt_distance(QuickOperator, bpy.types.Operator):
         if len(active) != 1 or len(others) != 1:
             raise Complaint("Select two mesh objects, the one that is to be coloured last.")
         obj = active[0][0]
+        for each, reading in (*active, *others):
+            with complaints(each):
+                check_places(reading.surface)
         mine, other = placed_mesh(*active[0]), placed_mesh(*others[0])
         with complaints():
             figures = drain(compare(other, mine))

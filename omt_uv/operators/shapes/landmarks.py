@@ -169,7 +169,7 @@ class OBJECT_OT_omt_landmarks_suggest(_OnPair, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         from ...blender.mesh import read
         from ...blender.shapes.landmarks import free_name, put_landmark
-        from ...solver.registration.suggestions import suggest_landmarks
+        from ...solver.registration.suggestions import check_side, suggest_landmarks
 
         objects = source_and_target(context)
         sides = []
@@ -177,6 +177,7 @@ class OBJECT_OT_omt_landmarks_suggest(_OnPair, bpy.types.Operator):
             with complaints(obj):
                 surface = read(obj).surface
                 sides.append((surface.positions, surface.corner_vertex[surface.triangles]))
+                check_side(*sides[-1])
         found = suggest_landmarks(sides[0], sides[1], self.most)
         if not len(found.source):
             raise Complaint("Nothing stands out that looks alike on both. Pick landmarks by hand.")

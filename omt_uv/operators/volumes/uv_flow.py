@@ -46,11 +46,15 @@ class UV_OT_omt_flow(SolverOperator, bpy.types.Operator):
         """Triples of object, Reading and corners (k,) of its faces to work on; raises Complaint."""
         import numpy as np
 
+        from ...pipelines.reading import check_uvs
+
         objects, readings = read_writable(context)
         jobs = []
         for obj, reading in zip(objects, readings, strict=True):
             if reading.uv is None:
                 raise Complaint(f"{obj.name}: There are no UVs to push. Unwrap it first.", obj)
+            with complaints(obj):
+                check_uvs(reading.surface, reading.uv, reading.faces)
             jobs.append((obj, reading, np.flatnonzero(np.repeat(reading.faces, np.diff(reading.surface.face_start)))))
         return jobs
 

@@ -6,10 +6,10 @@ from dataclasses import asdict
 
 import numpy as np
 
-from ...solver.errors import NonFiniteError
 from ...solver.mesh.surface import Surface, check_finite
 from ...solver.strain.beltrami import Beltrami, corner_beltrami
 from ...solver.strain.regions import RegionStrain
+from ..reading import check_uvs
 
 
 def strain_of(surface: Surface, uv: np.ndarray | None = None, shape: np.ndarray | None = None) -> Beltrami:
@@ -26,11 +26,8 @@ def strain_of(surface: Surface, uv: np.ndarray | None = None, shape: np.ndarray 
     check_finite(surface.positions, triangles)
     corners = surface.positions[triangles]
     if uv is not None:
-        mapped = np.asarray(uv, float)[surface.triangles]
-        wrong = np.unique(surface.triangle_face[~np.isfinite(mapped).all(axis=(1, 2))])
-        if len(wrong):
-            raise NonFiniteError("A UV is not a finite number", "Unwrap these faces anew first", "face", wrong)
-        return corner_beltrami(corners, mapped)
+        check_uvs(surface, uv)
+        return corner_beltrami(corners, np.asarray(uv, float)[surface.triangles])
     image = np.asarray(shape, float)
     check_finite(image, triangles)
     return corner_beltrami(corners, image[triangles])

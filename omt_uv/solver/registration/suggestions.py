@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.saliency import saliency, unit_size
-from ..mesh.geometry import vertex_normals
+from ..errors import EmptyMeshError
+from ..mesh.geometry import face_areas, vertex_normals
+from ..mesh.surface import check_finite
 from ..mesh.topology import halfedges
 from .functional_maps import descriptors
 
@@ -38,8 +40,19 @@ class Suggestions:
 def suggest_landmarks(
     source: tuple[np.ndarray, np.ndarray], target: tuple[np.ndarray, np.ndarray], most: int = 12
 ) -> Suggestions:
-    """Pairs of vertices of a source (n,3), (m,3) and a target (k,3), (l,3) that look and lie alike, at most so many."""
+    """Pairs of vertices of a source (n,3), (m,3) and a target (k,3), (l,3) that look and lie alike, at most so many.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : see `check_side`
+    """
+    for side in (source, target):
+        check_side(*side)
     first, second = _described(*source), _described(*target)
+    if not (len(first[0]) and len(second[0])):
+        # A surface may be as curved everywhere.
+        none = np.zeros(0, np.int64)
+        return Suggestions(none, none, np.zeros(0))
     difference = ((first[1][:, None] - second[1]) ** 2).sum(axis=2)
     best, other = difference.argmin(axis=1), difference.argmin(axis=0)
     row = np.arange(len(best))
@@ -47,6 +60,16 @@ def suggest_landmarks(
     row = row[mutual]
     order = row[np.argsort(difference[row, best[row]], kind="stable")][:most]
     return Suggestions(first[0][order], second[0][best[order]], difference[order, best[order]])
+
+
+def check_side(vertices: np.ndarray, triangles: np.ndarray) -> None:
+    """Raise EmptyMeshError or NonFiniteError where a surface (n,3), (m,3) has no face, or none with an area, or a face
+    that is nowhere."""
+    if not len(triangles):
+        raise EmptyMeshError("There are no faces to look at", "Choose a mesh with faces")
+    check_finite(vertices, triangles)
+    if not face_areas(vertices, triangles).any():
+        raise EmptyMeshError("No face has an area", "Choose a mesh whose faces are no lines and no points")
 
 
 def _described(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

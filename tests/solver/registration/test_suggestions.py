@@ -1,0 +1,36 @@
+"""Landmarks are suggested where something stands out: where nothing does there are none, and no surface is an error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sphere_shapes import blob
+
+from omt_uv.solver.errors import EmptyMeshError, NonFiniteError
+from omt_uv.solver.registration.suggestions import suggest_landmarks
+
+BODY, ROUND = blob(3, seed=1), blob(1, seed=2)
+
+
+@pytest.mark.parametrize("pair", [(ROUND, BODY), (BODY, ROUND), (ROUND, ROUND)], ids=["first", "second", "both"])
+def test_where_nothing_stands_out_there_are_none(pair):
+    found = suggest_landmarks(*pair)
+    assert len(found.source) == len(found.target) == len(found.difference) == 0
+
+
+@pytest.mark.parametrize("most", [1, 4])
+def test_a_surface_has_its_own_places_the_least_different_first(most):
+    found = suggest_landmarks(BODY, BODY, most)
+    assert len(found.source) == most and found.source.tolist() == found.target.tolist()
+    np.testing.assert_allclose(found.difference, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_what_is_no_surface_is_refused(side):
+    V, F = BODY
+    strange = V.copy()
+    strange[F[7, 1]] = np.nan
+    for wrong, error in (((V, F[:0]), EmptyMeshError), ((0 * V, F), EmptyMeshError), ((strange, F), NonFiniteError)):
+        with pytest.raises(error) as raised:
+            suggest_landmarks(*((wrong, BODY) if side == 0 else (BODY, wrong)))
+    assert raised.value.elements.tolist() == [F[7, 1]]
