@@ -59,3 +59,48 @@ def test_the_picture_has_the_colours_that_the_3d_view_has(package):
                 shown = picture[int(128 * (1 - v)), int(128 * u)]
                 np.testing.assert_allclose(shown, colours.reshape(-1, 4)[face.loop_start, :3], atol=0.02)
         bpy.ops.uv.omt_overlay(show="NONE")
+
+
+@pytest.mark.parametrize("kind", ["AREA", "SHEAR"])
+def test_the_uv_editor_is_filled_with_every_face_where_it_lies_in_its_colour(package, kind):
+    """What is drawn there, by plain formulas: places of triangles, colours of their faces, and the sides of these."""
+    import bpy
+
+    overlay = package("display.overlay")
+    found = [scenes.bump(3, 2, name="One"), scenes.bump(2, 2, height=0.2, name="Two", offset=2.0)]
+    for k, obj in enumerate(found):
+        uv = scenes.seen_from_above(obj) - [2.0 * k, 0]
+        scenes.set_uv(obj, uv * [0.2 + 0.2 * k, 0.3] + 0.02 * np.sin(9 * uv[:, ::-1]) + 0.5 * k)
+    scenes.select(found)
+    try:
+        assert bpy.ops.uv.omt_overlay(show=kind) == {"FINISHED"}
+        shown = overlay._shown
+        places, colours = np.array(shown.places).reshape(-1, 3, 2), np.array(shown.colours).reshape(-1, 3, 4)
+        edges = np.array(shown.edges).reshape(-1, 2, 2)
+    finally:
+        bpy.ops.uv.omt_overlay(show="NONE")
+    space, flat = (np.concatenate(x) for x in zip(*map(scenes.polygon_areas, found), strict=True))
+    octaves = np.log2(flat / flat.sum() / (space / space.sum()))
+    polygons = [scenes.uv_of(obj)[list(face.loop_indices)] for obj in found for face in obj.data.polygons]
+    sides = {
+        tuple(map(tuple, (a, b))) for quad in polygons for a, b in zip(quad, np.roll(quad, -1, axis=0), strict=True)
+    }
+    assert {tuple(map(tuple, side)) for side in edges.astype(np.float32)} == sides and len(edges) == len(sides)
+    assert len(places) == 2 * len(polygons) and np.ptp(colours, axis=1).max() == 0
+    seen = np.zeros(len(polygons))
+    for triangle, colour in zip(places, colours[:, 0], strict=True):
+        (mine,) = [
+            k for k, quad in enumerate(polygons) if all((np.abs(quad - c).max(axis=1) < 1e-6).any() for c in triangle)
+        ]
+        u, v = triangle[1] - triangle[0], triangle[2] - triangle[0]
+        seen[mine] += (u[0] * v[1] - u[1] * v[0]) / 2
+        if kind == "AREA":
+            np.testing.assert_allclose(colour[:3], colormaps.area_colours(octaves[[mine]])[0], atol=1e-5)
+    np.testing.assert_allclose(seen, flat, rtol=1e-5)
+    if kind == "SHEAR":
+        # All triangles of a face have one colour.
+        of = [
+            min(range(len(polygons)), key=lambda k: np.abs(polygons[k].mean(axis=0) - t.mean(axis=0)).sum())
+            for t in places
+        ]
+        assert all(np.ptp(colours[np.array(of) == k, 0], axis=0).max() == 0 for k in set(of))
