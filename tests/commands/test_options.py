@@ -11,7 +11,7 @@ GOOD = [("share", "0", 0.0), ("share", "1", 1.0), ("shear", "1.01", 1.01), ("she
         ("tile", "1999", 1999), ("tile", "1001", 1001), ("texture_size", "1", 1), ("positive", "1e-9", 1e-9),
         ("angle", "180", 180.0), ("vertices", "357913941", 357913941), ("faces", "1", 1),
         ("faces", "715827882", 715827882), ("aspect", "0", 0.0), ("aspect", "9999", 9999.0),
-        ("subdivision", "6", 6), ("subdivision", "off", 0)]  # fmt: skip
+        ("subdivision", "6", 6), ("subdivision", "0", 0), ("subdivision", "off", 0)]  # fmt: skip
 BAD = [("share", "-0.1"), ("share", "nan"), ("shear", "1"), ("shear", "0.5"), ("shear", "-1"), ("shear", "inf"),
        ("margin", "-1"), ("margin", "nan"), ("tile", "1000"), ("tile", "2000"), ("texture_size", "0"),
        ("positive", "0"), ("positive", "-inf"), ("angle", "181"), ("angle", "nan"),

@@ -187,6 +187,14 @@ def test_the_list_of_further_regions_is_that_of_the_object(package):
     draw_settings(Layout(record), properties)
     assert "further" not in record and {"uv.omt_region_add", "uv.omt_region_remove"} < set(record)
     assert record.count("group") == 2 and record.count("factor") == 3
+    # One that is there is chosen from the groups, one that is not stays as it is written.
+    searched = []
+    layout = Layout([])
+    layout.prop_search = lambda item, *_, **__: searched.append(item.group)
+    layout.column = layout.row = lambda **_: layout
+    for item in obj.omt_uv_regions.rows:
+        bpy.types.UV_UL_omt_regions.draw_item(None, bpy.context, layout, None, item, 0, None, "")
+    assert searched == ["eyes"]
 
 
 def test_a_group_about_to_be_made_is_no_search_that_finds_nothing(package):

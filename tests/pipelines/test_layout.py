@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.errors import UserError
+from omt_uv.pipelines import layout
 from omt_uv.pipelines.layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together, pack_islands
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import FIRST_TILE, Settings
@@ -109,3 +110,23 @@ def test_islands_stand_upright_in_the_layout():
         side = np.polyfit(wall[F.ravel(), height], layout.uv[0][:, 0], 1)[0]
         assert rise > 0 and side == pytest.approx(0, abs=1e-6 * rise)
         np.testing.assert_allclose(0.5 * (layout.uv[0].min(axis=0) + layout.uv[0].max(axis=0)), 0.5)
+
+
+@pytest.mark.parametrize("tile, origin", [(1001, (0, 0)), (1002, (1, 0)), (1013, (2, 1))])
+def test_islands_that_stay_are_packed_around_in_their_own_tile(monkeypatch, tile, origin):
+    """The packer works in the unit square: what stays is told it there, and what is packed goes to the tile."""
+    told = []
+
+    def pack(islands, triangles, margin, texture_size, staying):
+        yield from ()
+        told.append((margin, texture_size, staying))
+        return layout.Packing(list(islands), 1.0, "shelves", 0.0)
+
+    monkeypatch.setattr(layout, "pack", pack)
+    island, index = np.array([[0.1, 0.1], [0.4, 0.1], [0.1, 0.4]]), np.array([[0, 1, 2]])
+    settings = Settings(margin=7, texture_size=512, tile=tile)
+    found = drain(layout.pack_islands([island], [index], settings, [(island + 0.5 + origin, index)]))
+    ((margin, size, ((points, triangles),)),) = told
+    assert (margin, size) == (7, 512) and triangles is index
+    np.testing.assert_allclose(points, island + 0.5)
+    np.testing.assert_allclose(found.islands[0], island + origin)

@@ -140,3 +140,18 @@ def test_undo_takes_it_back():
     assert ".sculpt_face_set" in obj.data.attributes
     bpy.ops.ed.undo()
     assert ".sculpt_face_set" not in bpy.data.objects["Ball"].data.attributes
+
+
+@pytest.mark.parametrize("write", ["MESH", "POINTS"])
+def test_objects_made_of_what_is_edited_leave_it_active_and_selected(write):
+    obj = scenes.bump(4, 4)
+    scenes.edit(obj, faces=[0, 1, 2, 5])
+    before = set(bpy.data.objects)
+    assert bpy.ops.mesh.omt_partition(cells=2, relax=0, write=write) == {"FINISHED"}
+    (made,) = set(bpy.data.objects) - before
+    assert bpy.context.mode == "EDIT_MESH" and bpy.context.view_layer.objects.active == obj
+    assert obj.select_get()
+    scenes.leave_edit()
+    assert bpy.ops.mesh.omt_partition(cells=2, relax=0, write=write) == {"FINISHED"}
+    (second,) = set(bpy.data.objects) - before - {made}
+    assert bpy.context.view_layer.objects.active == second and bpy.context.selected_objects == [second]
