@@ -152,6 +152,7 @@ def test_objects_made_of_what_is_edited_leave_it_active_and_selected(write):
     assert bpy.context.mode == "EDIT_MESH" and bpy.context.view_layer.objects.active == obj
     assert obj.select_get()
     scenes.leave_edit()
+    scenes.select([obj])
     assert bpy.ops.mesh.omt_partition(cells=2, relax=0, write=write) == {"FINISHED"}
     (second,) = set(bpy.data.objects) - before - {made}
     assert bpy.context.view_layer.objects.active == second and bpy.context.selected_objects == [second]
