@@ -6,6 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv import xatlas_charts
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import EmptyMeshError
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -45,3 +46,26 @@ def test_nothing_to_segment():
     V, F = meshes.cube()
     with pytest.raises(EmptyMeshError):
         chart_seams(triangle_surface(V, F), np.zeros(len(F), bool))
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_polygon_goes_where_its_first_triangle_goes(monkeypatch, backwards):
+    """Of a row of quads, whose triangles are said to be in these charts, borders are where those of first ones differ."""
+    V, polygons = meshes.quad_grid(6, 1)
+    mesh = meshes.polygon_surface(V, polygons)
+    charts = np.array([[0, 1], [0, 0], [1, 0], [1, 1], [2, 1], [2, 2]])
+    first = np.array([mesh.triangle_face.tolist().index(f) for f in range(6)])
+    of = np.empty(12, int)
+    for f in range(6):
+        rows = np.flatnonzero(mesh.triangle_face == f)
+        of[rows] = charts[f] if not backwards else charts[f][::-1]
+    monkeypatch.setattr(xatlas_charts, "_chart_of_triangle", lambda *_: of)
+    seams = {frozenset(edge) for edge in chart_seams(mesh).tolist()}
+    chart = of[first]
+    expected = set()
+    for f in range(5):
+        for g in range(f + 1, 6):
+            common = set(polygons[f]) & set(polygons[g])
+            if len(common) == 2 and chart[f] != chart[g]:
+                expected.add(frozenset(map(int, common)))
+    assert seams == expected and expected

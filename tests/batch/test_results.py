@@ -135,6 +135,13 @@ def test_a_figure_that_is_no_number_is_none_on_the_page(package, tmp_path, value
     assert [line[place] for line in table["rows"]] == [shown, 0.5]
 
 
+@pytest.mark.parametrize("kind, number", [("charts", "chart"), ("levels", "level")])
+def test_numbers_of_parts_are_no_figures(package, kind, number):
+    parts = [{number: k, "faces": 10, "rms": 0.1 * k} for k in range(3)]
+    found = package("batch.figures").figures_of(json.dumps({kind: parts}))
+    assert found == pytest.approx({kind: 3, "faces": 30, "rms": 0.1})
+
+
 # ---- the page, in a browser ---------------------------------------------------------------------------------
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -109,3 +109,16 @@ def test_a_large_file_has_a_process_of_its_own(package, work, monkeypatch):
     pool = module.Servants((sys.executable, "-c", "print(17)"), 0.0, lambda _child: None)
     outcome = pool.watch(supervision.Errand(pool.start, str(work.root / "in" / "a.obj")))
     assert outcome.status == 0 and outcome.out == "17\n"
+
+
+@pytest.mark.parametrize("told", [{"VmHWM": 700, "VmRSS": 30}, {"VmRSS": 30}, {}])
+def test_an_answer_has_the_memory_at_most_and_that_which_is_left(package, monkeypatch, tmp_path, told):
+    serve = package("commands.batches.serve")
+    monkeypatch.setattr(serve, "_memory", lambda: told)
+    monkeypatch.setattr(serve, "FORGET", tmp_path / "forget")
+    task = {"words": ["a", "b"], "out": str(tmp_path / "out"), "err": str(tmp_path / "err")}
+    ran = []
+    answer = serve._answered(task, lambda words: ran.append(words) or 7)
+    assert ran == [["a", "b"]] and answer["status"] == 7 and answer["processor"] >= 0
+    assert (answer["memory"], answer["at_rest"]) == (told.get("VmHWM"), told.get("VmRSS", 0))
+    assert (tmp_path / "forget").read_text() == "5"

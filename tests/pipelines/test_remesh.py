@@ -162,3 +162,17 @@ def test_parts_keep_their_sides_where_both_of_a_joint_look_outwards_as_given(mon
     kept = remeshing._sides_back(np.random.default_rng(0).normal(size=(8, 3)), given, gluing, turned)
     odd = first and second
     assert kept.tolist() == [odd and inside, odd, False, False]
+
+
+@pytest.mark.parametrize("count_of, counts", [("vertices", [80, 40]), ("faces", [156, 78])])
+def test_features_are_those_that_so_many_vertices_can_show(monkeypatch, count_of, counts):
+    """Of faces there are twice as many."""
+    asked, features = [], remeshing._features
+
+    def recorded(job, triangles, density, vertex_count):
+        asked.append(vertex_count)
+        return features(job, triangles, density, vertex_count)
+
+    monkeypatch.setattr(remeshing, "_features", recorded)
+    series(*meshes.icosphere(2), count_of=count_of, count=counts[0], levels=2)
+    assert asked == (counts if count_of == "vertices" else [n // 2 for n in counts])

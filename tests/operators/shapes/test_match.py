@@ -143,6 +143,26 @@ def test_two_meshes_are_needed_and_a_linked_or_locked_target_is_refused():
     unchanged("no name", source, target, mode="WRAP", shape_key="")
 
 
+@pytest.mark.parametrize("linked", ["Source", "Target"])
+@pytest.mark.parametrize("mode, written", [("TRANSFER", {"Target"}), ("CHECKER", {"Source", "Target"}),
+                                           ("WRAP", {"Source"}), ("MORPH", {"Source"})])  # fmt: skip
+def test_what_is_written_has_to_be_local_and_what_is_read_has_not(package, monkeypatch, mode, written, linked):
+    source, target, _ = pair()
+    mesh, objects = package("blender.mesh"), package("blender.shapes.match_objects")
+
+    def check_local(obj):
+        if obj.name == linked:
+            raise mesh.TargetError(f"{obj.name} is linked.")
+
+    def match_job(*_):
+        raise mesh.TargetError("It went on.")
+
+    monkeypatch.setattr(mesh, "check_local", check_local)
+    monkeypatch.setattr(objects, "match_job", match_job)
+    said = scenes.error_of(bpy.ops.object.omt_match, mode=mode)
+    assert (f"{linked} is linked" in said) == (linked in written) and ("went on" in said) == (linked not in written)
+
+
 def test_empties_are_landmarks_and_are_kept_in_files(tmp_path, package):
     source, target, of = pair(landmarks=False, turned=False)
     place = package("operators.shapes.landmarks").place
