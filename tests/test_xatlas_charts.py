@@ -50,7 +50,7 @@ def test_nothing_to_segment():
 
 @pytest.mark.parametrize("backwards", [False, True])
 def test_a_polygon_goes_where_its_first_triangle_goes(monkeypatch, backwards):
-    """Of a row of quads, whose triangles are said to be in these charts, borders are where those of first ones differ."""
+    """Of a row of quads whose triangles are in these charts, borders are where those of the first ones differ."""
     V, polygons = meshes.quad_grid(6, 1)
     mesh = meshes.polygon_surface(V, polygons)
     charts = np.array([[0, 1], [0, 0], [1, 0], [1, 1], [2, 1], [2, 2]])

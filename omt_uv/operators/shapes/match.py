@@ -116,7 +116,8 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
         with complaints(target):
             second = read_carrier(target)
         with complaints():
-            check_room(target, first.attributes, self.kinds())
+            if self.mode == "TRANSFER":
+                check_room(target, first.attributes, self.kinds())
             for obj in (source,) if self.mode in SHAPING else (source, target)[self.mode == "TRANSFER" :]:
                 check_local(obj)
             points = (read_landmarks(source, self.landmark_prefix), read_landmarks(target, self.landmark_prefix))
