@@ -110,3 +110,16 @@ def test_nothing_that_is_wrong_with_a_mesh_is_a_defect_of_the_program(run, folde
     words = [files.get(word, word) for word in EVERY[name].split()]
     status, _, err = run(name.split()[0], folder / f"{file}.blend", *words)
     assert status in (0, 1) and "defect" not in err and "Traceback" not in err, err
+
+
+@pytest.mark.parametrize("others", [0, 1, 2])
+def test_a_mesh_without_faces_is_left_alone_beside_others_and_that_is_said(run, tmp_path, others):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for k in range(others):
+        command_runs.body(NAMES[k], at=4.0 * k)
+    scenes.add([(0, 0, 0), (1, 0, 0)], [], "Bare")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, out, err = run("measure", tmp_path / "in.blend")
+    assert status == (0 if others else 1) and ("Area error" in out) == bool(others)
+    told = [line for line in err.splitlines() if "no faces" in line]
+    assert len(told) == 1 and ("Bare has no faces and is left alone" in told[0]) == bool(others), err
