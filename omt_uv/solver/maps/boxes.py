@@ -1,4 +1,8 @@
-"""Find which of many boxes in the plane meet: few by a sweep over the plane, many by a grid."""
+"""Find which of many boxes in the plane meet: few by a sweep over the plane, many by a grid.
+
+Boxes that meet along both axes meet along every direction between them, and rounded sums keep the order of what is
+summed. So a slanting sweep misses none, and there is no side of a square whose boxes all meet along it.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,8 @@ from ..mesh.topology import expand
 # The grid in which they are found is made coarser until a box touches so many of its cells at most, on average,
 # and has at most so many along a side.
 CELLS_PER_BOX = 12
+# Along what the sweep goes: the longer axis, and so much of the other one.
+SLANT = 0.25
 # A sweep compares so many boxes with each on average at most; where more lie one above the other, a grid is faster.
 SWEPT_PER_BOX = 40
 MOST_CELLS = 2**24
@@ -22,14 +28,11 @@ def box_pairs(
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low = np.minimum(low1.min(0), low2.min(0))
     extents = np.maximum(high1.max(0), high2.max(0)) - low
-    along = int(extents.argmax())
-    pairs = _swept(low1, high1, low2, high2, along)
-    # Those of a sweep meet along its axis.
-    left = (1 - along,) if pairs is not None else (0, 1)
+    pairs = _swept(low1, high1, low2, high2, int(extents.argmax()))
     i, j = _in_grid(low1, high1, low2, high2, low, float(extents.max())) if pairs is None else pairs
     meet = np.ones(len(i), bool)
     # Axis by axis: millions of edges have many millions of pairs.
-    for axis in left:
+    for axis in range(2):
         meet &= (low1[:, axis][i] <= high2[:, axis][j]) & (low2[:, axis][j] <= high1[:, axis][i])
     key = np.sort(i[meet] * len(low2) + j[meet])
     key = key[np.append(True, key[1:] != key[:-1])] if len(key) else key
@@ -37,8 +40,8 @@ def box_pairs(
 
 
 def _swept(low1, high1, low2, high2, axis: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Pairs (p,) of boxes that meet along an axis, or None where these are too many; boxes of points as they are."""
-    begin1, end1, begin2, end2 = (x[:, axis] for x in (low1, high1, low2, high2))
+    """Pairs (p,) of boxes that meet along a sweep mostly along an axis, or None where these are too many."""
+    begin1, end1, begin2, end2 = (x[:, axis] + SLANT * x[:, 1 - axis] for x in (low1, high1, low2, high2))
     order1, order2 = np.argsort(begin1), np.argsort(begin2)
     sorted1, sorted2 = begin1[order1], begin2[order2]
     # Of two that meet, one begins in the other: the second in the first or at its beginning, or else the first.

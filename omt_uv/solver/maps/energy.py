@@ -17,11 +17,11 @@ of several triangles adds the square of its area's slope (Gauss-Newton), one row
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..mesh.geometry import Sides, Sizes, kept_hats
+from ..mesh.geometry import LastAnswer, Sides, Sizes, kept_hats
 
 # A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
 SHARE_ERROR = 2.7
@@ -75,6 +75,7 @@ class Elements:
     polygon: np.ndarray | None = None
     lone: np.ndarray | None = None
     quads: Quads | None = None
+    _last: LastAnswer = field(default_factory=LastAnswer, repr=False, compare=False)
 
     @property
     def gradient(self) -> np.ndarray:
@@ -103,7 +104,11 @@ class Elements:
         return np.arange(len(self.triangles)) if self.polygon is None else self.polygon
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dw/dz and dw/dconj(z) per triangle, (m,) complex each, of a map w (n,) complex."""
+        """dw/dz and dw/dconj(z) per triangle, (m,) complex each and not to be written to, of a map w (n,) complex."""
+        few = len(self.triangles) <= AT_ONCE
+        return self._last.of(self._derivatives, w, self.triangles, self.hats) if few else self._derivatives(w)
+
+    def _derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         a, b = (np.empty(len(self.triangles), complex) for _ in range(2))
         for here in self.some_at_once():
             a[here], b[here] = self.derivatives_at(w, here)
@@ -118,11 +123,15 @@ class Elements:
         """Triangles some after the others: what is found of all on the way takes more memory than the mesh."""
         return (slice(begin, begin + AT_ONCE) for begin in range(0, len(self.triangles), AT_ONCE))
 
+    def some_derivatives(self, w: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """`derivatives` of some triangles after the others, and which these are."""
+        few = len(self.triangles) <= AT_ONCE
+        return ((here, *(self.derivatives(w) if few else self.derivatives_at(w, here))) for here in self.some_at_once())
+
     def determinants(self, w: np.ndarray) -> np.ndarray:
         """Of the Jacobian of every triangle, (m,), of a map w (n,) complex."""
         det = np.empty(len(self.triangles))
-        for here in self.some_at_once():
-            a, b = self.derivatives_at(w, here)
+        for here, a, b in self.some_derivatives(w):
             det[here] = squared(a) - squared(b)
         return det
 
@@ -302,7 +311,7 @@ def by_squares(faces, a, b, area_weight, pressure, eagerness):
     slope = area_weight / 2 * (1 / ratio - ratio / whole**2)
     bend = area_weight * eager_bend(whole / ratio, eagerness) / ratio**2
     if faces.alone is not None:
-        # That of a polygon of several triangles is a row of its own, see `area_forms`.
+        # That of a polygon of several triangles is a row of its own, see `area_forms_of`.
         bend = np.where(faces.alone, bend, 0)
     bend = bend + 4 * inner / det**3
     shear_outer, shear_inner = -2 * inner / det**2, 2 / det + 2 * inner / det**2
@@ -328,17 +337,6 @@ def eager_bend(r: np.ndarray, eagerness: float | np.ndarray) -> np.ndarray:
     return factor**eagerness / r**3
 
 
-def area_forms(
-    faces: Elements, w: np.ndarray, area_weight: float | np.ndarray, eagerness: float | np.ndarray = 0.0
-) -> np.ndarray:
-    """Rows of the area term's Hessian, corner by corner (m,3) complex: a polygon's row is the sum over its triangles.
-
-    The row is the slope of the polygon's area times the root of the area term's second derivative by it. 0 for polygons
-    of one triangle, whose term is among the rows of `face_derivatives`. eagerness : see `eager_bend`
-    """
-    return area_forms_of(faces, *faces.derivatives(w), area_weight, eagerness)
-
-
 def area_forms_of(
     faces: Elements,
     a: np.ndarray,
@@ -346,7 +344,12 @@ def area_forms_of(
     area_weight: float | np.ndarray,
     eagerness: float | np.ndarray = 0.0,
 ) -> np.ndarray:
-    """As `area_forms`, from the derivatives a, b (m,) complex of the map."""
+    """Rows of the area term's Hessian, corner by corner (m,3) complex: a polygon's row is the sum over its triangles.
+
+    The row is the slope of the polygon's area times the root of the area term's second derivative by it. 0 for polygons
+    of one triangle, whose term is among the rows of `face_derivatives`. a, b (m,) complex : derivatives of the map;
+    eagerness : see `eager_bend`
+    """
     whole = faces.sums(squared(a) - squared(b))
     size = np.sqrt(faces.weight * area_weight * eager_bend(whole / faces.ratio, eagerness)) / faces.ratio
     g, alone, part = faces.gradient, faces.alone, faces.part

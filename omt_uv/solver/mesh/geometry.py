@@ -366,6 +366,30 @@ class Sizes:
         return self._sides.areas(rows).reshape(-1, 4) / self._whole[some, None]
 
 
+class LastAnswer:
+    """What was found of the last map (n,) that somebody asked about: what comes after a step asks for it five times."""
+
+    def __init__(self) -> None:
+        self._about: tuple[object, ...] = ()
+        self._map, self._found = np.zeros(0), (np.zeros(0), np.zeros(0))
+
+    def of(
+        self, find: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], w: np.ndarray, *about: object
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """find(w), not to be written to, which hangs on these objects besides.
+
+        >>> last = LastAnswer()
+        >>> last.of(lambda w: (w, 2 * w), np.ones(1))[1] is last.of(lambda w: (w, w), np.ones(1))[1]
+        True
+        """
+        same = len(about) == len(self._about) and all(a is b for a, b in zip(about, self._about, strict=True))
+        if not (same and np.array_equal(self._map, w)):
+            self._about, self._map, self._found = about, w.copy(), find(w)
+            for part in self._found:
+                part.flags.writeable = False
+        return self._found
+
+
 def kept_sizes(hats: np.ndarray | Sides, area: np.ndarray, whole: np.ndarray) -> np.ndarray | Sizes:
     """Areas (q,4) over whole ones (q,), or what makes these where the triangles are many."""
     return Sizes(hats, whole) if isinstance(hats, Sides) else area / whole[:, None]

@@ -31,7 +31,6 @@ from ..maps.energy import (
 )
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import in_turn, restricted
-from ..mesh.geometry import of_corners
 from ..mesh.polygon_areas import BOTH
 from ..mesh.topology import order_of_numbers
 
@@ -389,27 +388,23 @@ def _in_axes(blocks: np.ndarray, triangles: np.ndarray, frame, free, symmetry: M
     """Bring blocks (6,6,m) of triangles (m,3), in place, into the axes of their vertices, or of those these follow;
     these vertices (m,3)."""
     found = triangles if symmetry is None else symmetry.representative[triangles]
-    if symmetry is None and (frame == 1).all() and free.all():
-        return found
-    plain = (frame[found] == 1) & free[found].all(axis=2)
+    plain = (frame == 1) & free.all(axis=1)
     if symmetry is not None:
-        plain &= ~symmetry.flip[triangles] & (symmetry.factor[triangles] == 1)
-    turned = np.flatnonzero(~of_corners(np.logical_and, plain))
-    if not len(turned):
+        plain = plain[symmetry.representative] & ~symmetry.flip & (symmetry.factor == 1)
+    if plain.all():
         return found
-    # Rows of linear forms that say 1 and i, as forms of the steps along the axes.
-    corners = triangles[turned]
-    forms = np.tile(np.array([1, -1j])[:, None], (len(turned), 1, 3))
-    if symmetry is not None:
-        corners, forms = symmetry.carried(corners, forms)
-    forms = forms * frame[corners][:, None]
-    by_corner = (np.stack([forms.real, -forms.imag], axis=3) * free[corners][:, None]).transpose(2, 1, 3, 0)
-    here = blocks if len(turned) == len(triangles) else blocks[:, :, turned]
-    for k, (first, second) in enumerate(by_corner):
-        for part in (here[2 * k : 2 * k + 2], here[:, 2 * k : 2 * k + 2].swapaxes(0, 1)):
-            part[:] = [first[q] * part[0] + second[q] * part[1] for q in range(2)]
-    if here is not blocks:
-        blocks[:, :, turned] = here
+    for k, vertices in enumerate(triangles.T):
+        turned = np.flatnonzero(~plain[vertices])
+        # Rows of linear forms that say 1 and i, as forms of the steps along the axes.
+        corner, forms = vertices[turned, None], np.tile(np.array([[1], [-1j]]), (len(turned), 1, 1))
+        if symmetry is not None:
+            corner, forms = symmetry.carried(corner, forms)
+        forms = (forms * frame[corner][:, None])[:, :, 0]
+        first, second = (np.stack([forms.real, -forms.imag], axis=2) * free[corner]).transpose(1, 2, 0)
+        for part in (blocks[2 * k : 2 * k + 2], blocks[:, 2 * k : 2 * k + 2].swapaxes(0, 1)):
+            u, v = (np.take(rows, turned, axis=1) for rows in part)
+            for q in range(2):
+                part[q][:, turned] = first[q] * u + second[q] * v
     return found
 
 

@@ -271,8 +271,8 @@ def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: f
 def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
     """The smallest t > 0 at which a face of w + t step has no area; infinity if there is none."""
     first, part = np.inf, faces.part
-    for here in faces.some_at_once():
-        far = fold_shares(*faces.derivatives_at(w, here), *faces.derivatives_at(step, here))
+    for here, a, b in faces.some_derivatives(w):
+        far = fold_shares(a, b, *faces.derivatives_at(step, here))
         first = (far if part is None else far[part[here] > 0]).min(initial=first)
     return float(first)
 

@@ -179,7 +179,7 @@ def newton_direction(
     """Step (n,2) along the `tangents`, 0 for fixed vertices (n,) bool, and the energy's slope along it.
 
     symmetry: of a map whose energy has none; the step is the symmetric one that is best for it
-    area (m,3) complex: the parts that triangles have in the rows of their polygons' areas, see `energy.area_forms`
+    area (m,3) complex: the parts that triangles have in the rows of their polygons' areas, see `energy.area_forms_of`
     """
     n, triangles, axes = len(positions), faces.triangles, tangents(positions)
     # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).

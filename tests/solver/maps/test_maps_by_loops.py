@@ -263,23 +263,27 @@ def test_boxes_meet_where_they_have_a_point_in_common(few, seed, monkeypatch):
     assert len(boxes.box_pairs(low1[:0], high1[:0], low2, high2)[0]) == 0
 
 
-def test_a_sweep_finds_each_pair_along_its_axis_once_and_gives_up_where_there_are_too_many():
+def test_a_sweep_finds_each_pair_along_its_way_once_and_gives_up_where_there_are_too_many():
     rng = np.random.default_rng(8)
     low1, low2 = rng.integers(0, 9, (12, 2)).astype(float), rng.integers(0, 9, (10, 2)).astype(float)
     high1, high2 = low1 + 1.0, low2 + 2.0
     for axis in range(2):
         pairs = Counter(zip(*(x.tolist() for x in boxes._swept(low1, high1, low2, high2, axis)), strict=True))
-        expected = {
-            (i, j)
-            for i in range(12)
-            for j in range(10)
-            if low1[i, axis] <= high2[j, axis] and low2[j, axis] <= high1[i, axis]
-        }
+        begin1, end1, begin2, end2 = (x @ np.roll([1.0, boxes.SLANT], axis) for x in (low1, high1, low2, high2))
+        expected = {(i, j) for i in range(12) for j in range(10) if begin1[i] <= end2[j] and begin2[j] <= end1[i]}
         assert set(pairs) == expected and set(pairs.values()) == {1}
     many = np.zeros((100, 2)), np.ones((100, 2))
     assert boxes._swept(*many, *many, 0) is None
     few = np.zeros((boxes.SWEPT_PER_BOX, 2)), np.ones((boxes.SWEPT_PER_BOX, 2))
     assert len(boxes._swept(*few, *few, 0)[0]) == boxes.SWEPT_PER_BOX**2
+
+
+def test_boxes_along_the_sides_of_a_square_are_not_all_compared():
+    along = np.linspace(0.0, 1.0, 101)[:-1]
+    sides = np.concatenate([along, 1 + 1j * along, 1 - along + 1j, 1j * (1 - along)])
+    low = np.column_stack([sides.real, sides.imag])
+    assert len(boxes._swept(low, low + 0.01, low, low + 0.01, 0)[0]) < 20 * len(low)
+    assert len(boxes.box_pairs(low, low + 0.01, low, low + 0.01)[0]) < 5 * len(low)
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.1])

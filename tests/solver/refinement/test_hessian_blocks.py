@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from omt_uv.solver.maps.energy import area_forms, face_derivatives
+from omt_uv.solver.maps.energy import area_forms_of, face_derivatives
 from omt_uv.solver.maps.mirror_symmetry import mirror_symmetry
 from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
@@ -39,7 +39,7 @@ def test_the_matrix_is_the_sum_of_the_squares_of_all_rows(convex):
     matrix = assembly_of(faces, n).matrix(found.triangles, np.zeros(2 * n), found.quads) + found.rest
     local = face_derivatives(faces, w, 20.0, 0.5, EAGERNESS / 2)
     rows = [(faces.triangles[i], r) for i in range(len(faces.triangles)) for r in local.rows[i]]
-    forms = area_forms(faces, w, 20.0, EAGERNESS / 2)
+    forms = area_forms_of(faces, *faces.derivatives(w), 20.0, EAGERNESS / 2)
     dense = np.zeros((len(rows) + len(faces.area), 2 * n))
     for k, (vertices, row) in enumerate(rows):
         for v, value in zip(vertices, row * frame[vertices], strict=True):
