@@ -105,7 +105,7 @@ class Elements:
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dw/dz and dw/dconj(z) per triangle, (m,) complex each and not to be written to, of a map w (n,) complex."""
-        few = len(self.triangles) <= AT_ONCE
+        few = len(w) <= len(self.triangles) <= AT_ONCE  # else a copy of the map takes as long as what it would save
         return self._last.of(self._derivatives, w, self.triangles, self.hats) if few else self._derivatives(w)
 
     def _derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -351,7 +351,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:
                 return even
-    if not draft:
+    if not draft or (disk.boundary != "free" and len(disk.vertices) <= COARSE_ABOVE):
         roomy = roomy_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log, large=False)
         if roomy is not None:
             return roomy

@@ -75,7 +75,8 @@ ISOMETRY = 1e-8
 # What is unrolled so that its outline lies on itself may be that far from one: shear of 1.02 to 1.1.
 UNROLLED = 1e-2
 # Drafts of charts with more vertices come by way of a coarser mesh, unless their log scale spreads less, and need no
-# step of all vertices where sweeps bring the areas of a draft.
+# step of all vertices where sweeps bring the areas of a draft. With an outline those of at most COARSE_ABOVE have
+# shorter a way from an embedding by evened weights, and shear less.
 DRAFT_ABOVE = 600
 DRAFT_COARSE_ABOVE = 2000
 DRAFT_COARSER = 6
@@ -184,9 +185,9 @@ def _coarse_initial_map(
     if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
         coarser = coarse_initial_map(coarse_disk, balance, log, None if flat is None else flat[coarse.kept], draft)
         found = yield from part_of(coarser, *COARSE_MAP)
-    if found is None and draft and corners is None and flat is not None:
+    if found is None and draft and flat is not None:
         found = _draft_start(coarse_disk, flat[coarse.kept], log)
-    elif found is None:
+    if found is None:
         found = yield from part_of(direct_initial_map(coarse_disk, log), *COARSE_MAP)
     quality = "freed" if disk.buried or found.freed else "sketch" if draft else "rough" if far else "relaxed"
     with log.timed("coarse refinement"):
@@ -248,8 +249,11 @@ def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, qu
     return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)
 
 
-def _draft_start(disk: DiskMesh, flat: np.ndarray, log: RunLog) -> InitialChartMap:
-    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2)."""
+def _draft_start(disk: DiskMesh, flat: np.ndarray, log: RunLog) -> InitialChartMap | None:
+    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2); with corners by evened weights, or None
+    where these squeeze it."""
+    if disk.corners is not None:
+        return evened_initial_map(disk, log, large=False)
     even = flat_initial_map(disk, log) if disk.boundary == "free" else None
     return InitialChartMap(flat) if even is None else even
 

@@ -674,6 +674,13 @@ def test_drafts_and_direct_starts_are_flat_only_where_the_boundary_is_free(bound
     assert initial_map._draft_start(disk, "embedded", RunLog()).uv == "embedded"
 
 
+@pytest.mark.parametrize("evened", ["evened", None])
+def test_drafts_in_squares_are_evened_where_that_leaves_room(evened, monkeypatch):
+    disk = disk_mesh("square", corners=np.arange(4))
+    monkeypatch.setattr(initial_map, "evened_initial_map", lambda *_, large: None if large else evened)
+    assert initial_map._draft_start(disk, "embedded", RunLog()) == evened
+
+
 def test_what_comes_back_is_smoothed_at_the_scale_of_its_target():
     disk = disk_mesh()
     uv = flat_uv(disk) * 7

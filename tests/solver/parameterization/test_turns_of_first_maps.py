@@ -89,6 +89,8 @@ def test_others_get_room_or_are_evened(first):
     assert first(roomy="roomy")[:2] == ("roomy", ["unroll", "roomy"])
     assert first(boundary="square", evened="evened")[:2] == ("evened", ["evened"])
     assert "roomy" not in first(draft=True, roomy="roomy")[1]
+    assert first(draft=True, boundary="disk", evened="evened", size=5000)[:2] == ("evened", ["evened"])
+    assert "evened" not in first(draft=True, boundary="disk", evened="evened", size=5001)[1]
 
 
 @pytest.mark.parametrize("draft", [False, True])
