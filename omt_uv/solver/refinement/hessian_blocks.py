@@ -135,7 +135,10 @@ class Assembly:
 
     def _with_diagonal(self, data: np.ndarray, diagonal: np.ndarray) -> sp.csc_matrix:
         data[self._diagonal] += diagonal
-        return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
+        found = sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
+        # Or SuperLU would look whether they are in order.
+        found.has_canonical_format = True
+        return found
 
 
 class RowAssembly:
