@@ -89,6 +89,7 @@ class SeamCosts:
     reasons : (e,) in [0, 1] for everything that has a factor, by its name in `SeamPreferences`
     vertex_cost (n,) : mean over the edges at a vertex, 1 where there is none
     face (n,) : in [0, 1], 1 on the front of a body that has one, and within it: seams should not end there
+    within (n,) : in [0, 1], 1 in a mouth, a nostril or a socket, which no seam reaches but across the face
     plane : in which the surface is its own mirror image; facing : where it looks to
     """
 
@@ -97,6 +98,7 @@ class SeamCosts:
     reasons: dict[str, np.ndarray]
     vertex_cost: np.ndarray
     face: np.ndarray
+    within: np.ndarray
     plane: SymmetryPlane | None
     facing: Facing
 
@@ -104,6 +106,11 @@ class SeamCosts:
     def in_face(self) -> np.ndarray:
         """Vertices (n,) bool that are in a face."""
         return self.face > IN_FACE
+
+    @property
+    def within_face(self) -> np.ndarray:
+        """Vertices (n,) bool that are deep in a face."""
+        return self.within > IN_FACE
 
     def of(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Costs (k,) of the edges between vertices a (k,) and b (k,); the mean of its ends where there is no edge."""
@@ -143,7 +150,7 @@ def seam_costs(
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)
         plane = _among_all(plane.carried(positions, space), used, len(surface.positions))
-    in_face = at_vertices.pop("face")
+    in_face, within_face = at_vertices.pop("face"), at_vertices.pop("within")
     reasons = {name: reason[edges].mean(axis=1) for name, reason in at_vertices.items()}
     reasons["sharp"] = _sharp(positions, triangles, keys)
     reasons["loops"] = _sides_of_quads(positions, triangles, owner, keys)
@@ -158,9 +165,9 @@ def seam_costs(
     count = np.bincount(ends.ravel(), minlength=n)
     total = np.bincount(ends.ravel(), np.repeat(cost, 2), n)
     vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
-    face = np.zeros(n)
-    face[used] = in_face
-    return SeamCosts(ends, cost, reasons, vertex_cost, face, plane, seen)
+    face, within = np.zeros(n), np.zeros(n)
+    face[used], within[used] = in_face, within_face
+    return SeamCosts(ends, cost, reasons, vertex_cost, face, within, plane, seen)
 
 
 def _is_chance(plane: SymmetryPlane, axes: SceneAxes) -> bool:
@@ -202,6 +209,7 @@ def _vertex_reasons(
     below = towards(positions, triangles, -seen.up)
     # Sockets and nostrils are hidden from most sides, but not from the front, from where a face is looked at.
     front = _step(forwards, SIDE) * (1 - _step(occlusion, BURIED))
+    face = np.maximum(front, _step(sure * ahead(positions, triangles, seen.front), SIDE))
     hidden = _step(occlusion, HIDDEN) * (1 - front)
     reasons = {
         "hidden": hidden,
@@ -212,7 +220,8 @@ def _vertex_reasons(
         "salient": salient_weights(saliency, area, SALIENT) * (1 - hidden),
         "mirror": np.zeros(n),
         # Within, too: whoever cuts in a mouth has come across the lips.
-        "face": np.maximum(front, _step(sure * ahead(positions, triangles, seen.front), SIDE)),
+        "face": face,
+        "within": face * (occlusion > BURIED[0]),
     }
     return seen, reasons
 

@@ -6,15 +6,15 @@ anyway is cut to the extremities that would be distorted most, or, where its sid
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
+from ..analysis.seam_costs import SeamCosts
 from ..errors import MERGING, TURN_OUTSIDE, plural
-from ..mesh.geometry import face_areas
-from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
+from ..mesh.gluing import Gluing, components, corner_classes, groups, oriented
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
 from ..mesh.surface import Surface, chosen_triangles
 from ..progress import Steps, drain, part_of
@@ -63,6 +63,10 @@ class SeamFinder(Protocol):
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
+
+    @property
+    def costs(self) -> Callable[[], SeamCosts]:
+        """Gives what seams cost, when that is known to be needed."""
 
     def priced(self, component: CutComponent) -> CutComponent:
         """The component with what it costs to cut its edges, also for a disk."""
@@ -164,7 +168,7 @@ def cut_gluing(
     """A repaired gluing cut into disks; see `cut`. outline : they are to fill an outline"""
     vertex_count = len(surface.positions)
     positions, unit = in_unit_box(surface, repaired.gluing)
-    gluing, one_sided = _oriented(repaired.gluing, positions)
+    gluing, one_sided = oriented(repaired.gluing, positions)
     twisted = one_sided
     component_of, classes = components(gluing), corner_classes(gluing)
     is_disk = classify(gluing, classes, component_of, one_sided).is_disk
@@ -184,7 +188,8 @@ def cut_gluing(
     if sieve is not None and search is not None:
         level = level_parts(gluing, positions)
     if fill or sieve is not None:
-        filled = fill_holes(surface, gluing, one_sided, None if fill else sieve, level)
+        costs = None if search is None else search.costs
+        filled = fill_holes(surface, gluing, one_sided, None if fill else sieve, level, costs)
         surface, gluing, holes = filled.surface, filled.gluing, filled.holes
         one_sided = np.append(one_sided, np.zeros(len(gluing.triangles) - len(one_sided), dtype=bool))
         positions, unit = in_unit_box(surface, gluing)
@@ -197,7 +202,7 @@ def cut_gluing(
     edges = np.stack(gluing.ends(gluing.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
     # What could not be oriented can be, now that it is cut.
-    gluing, _ = _oriented(gluing.without(gone), positions)
+    gluing, _ = oriented(gluing.without(gone), positions)
     length = sum(p.length for p in report) + unit * float(np.linalg.norm(apart, axis=1).sum())
     edges = np.concatenate([edges, parting, repaired.torn]).astype(np.int64)
     turned = gluing.triangles[: len(twisted), 1] != repaired.gluing.triangles[:, 1]
@@ -210,7 +215,7 @@ def cut_gluing(
 def uncut(surface: Surface, repaired: Repaired) -> CutSurface | None:
     """A repaired gluing, its faces turned to one side, with no cuts but where it was torn; None if it has one side."""
     positions, unit = in_unit_box(surface, repaired.gluing)
-    gluing, one_sided = _oriented(repaired.gluing, positions)
+    gluing, one_sided = oriented(repaired.gluing, positions)
     return None if one_sided.any() else _uncut(surface, gluing, repaired, components(gluing), unit)
 
 
@@ -374,13 +379,6 @@ def _by_component(component_of: np.ndarray, count: int) -> tuple[np.ndarray, np.
     """Items in the order of their components (p,), and where each of these begins, (count+1,)."""
     order = np.argsort(component_of, kind="stable")
     return order, np.searchsorted(component_of[order], np.arange(count + 1))
-
-
-def _oriented(gluing: Gluing, positions: np.ndarray) -> tuple[Gluing, np.ndarray]:
-    """Gluing in which neighbours look to the same side, and the triangles (m,) bool of components where they cannot."""
-    area = face_areas(positions, gluing.vertex[gluing.triangles])
-    turned, one_sided = orientations(gluing, area)
-    return turn_over(gluing, turned), one_sided
 
 
 def cut_component(

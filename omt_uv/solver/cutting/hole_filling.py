@@ -6,17 +6,19 @@ vertices after those of the surface.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.seam_costs import SeamCosts
 from ..errors import plural
-from ..mesh.geometry import face_areas, face_normals, lengths
+from ..mesh.geometry import face_areas, face_normals, lengths, unit
 from ..mesh.gluing import Gluing, components, corner_classes
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges
 from .component import NOISE
-from .gluing_facts import total_curvature
+from .gluing_facts import in_unit_box, total_curvature
 
 NO_POLYGON = -1
 # Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a component is a sieve.
@@ -28,12 +30,18 @@ FLAT = 1e-3
 SMALL = 0.01
 # Boundaries of a sieve that are so many times as long as most are no holes, but outer boundaries; at most MANY.
 OUTSTANDING = 3.0
+# Holes in a face are eyes, nostrils and throats, if they are no longer around than the first share of the root of the
+# area of their component, and either lie within the face, most of them, or open it to the front, by the cosine of the
+# second figure, as a hole in something smooth does: by the third, of what is around them.
+SHORT = 0.5
+FORWARDS = 0.5
+SMOOTH = 0.7
 
 
 @dataclass(frozen=True)
 class Filled:
     """The surface with a vertex in the middle of every hole, the gluing with the fans, and the number of holes, but for
-    those of what was to be filled as a whole."""
+    those of what was to be filled as a whole and those in faces."""
 
     surface: Surface
     gluing: Gluing
@@ -46,18 +54,22 @@ def fill_holes(
     one_sided: np.ndarray,
     sieve: int | None = None,
     whole: np.ndarray | None = None,
+    costs: Callable[[], SeamCosts] | None = None,
 ) -> Filled:
     """Fill all boundaries but the longest of every component of an oriented gluing.
 
     one_sided : (m,) triangles that are left alone
     sieve : fill only where there are more than so many holes, and leave outer boundaries open
     whole : (m,) triangles of components that are filled all the same
+    costs : gives those of seams; holes in a face are filled all the same, the longest, too
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
     boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, whole)
+    counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
+    if costs is not None:
+        boundary, loop = _with_holes_in_faces(in_unit_box(surface, gluing)[0], gluing, one_sided, boundary, costs)
     if len(boundary) == 0:
         return Filled(surface, gluing, 0)
-    counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
     filled = _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
     return replace(filled, holes=counted)
 
@@ -89,6 +101,15 @@ def hole_boundaries(
     whole: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The halfedges (r,) around the holes that `fill_holes` fills, and the number (r,) of the hole of each."""
+    boundary, loop = _boundaries(gluing, one_sided)
+    if len(boundary) == 0:
+        return boundary, boundary
+    return _chosen(boundary, loop, _holes(positions, gluing, boundary, loop, sieve, whole))
+
+
+def _boundaries(gluing: Gluing, one_sided: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The halfedges (r,) around all boundaries but those of the triangles one_sided (m,), and the number (r,) of the
+    boundary of each."""
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
     open_ = np.ones(len(tail), dtype=bool)
     open_[gluing.first] = open_[gluing.second] = False
@@ -98,9 +119,56 @@ def hole_boundaries(
         return boundary, boundary
     size = int(max(tail.max(), head.max())) + 1
     loop = graph_components(tail[boundary], head[boundary], size)[1]
-    loop = np.unique(loop[tail[boundary]], return_inverse=True)[1].ravel()
-    hole = _holes(positions, gluing, boundary, loop, sieve, whole)
+    return boundary, np.unique(loop[tail[boundary]], return_inverse=True)[1].ravel()
+
+
+def _chosen(boundary: np.ndarray, loop: np.ndarray, hole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Those of halfedges (r,) around the boundaries (r,) that are chosen (l,) bool, these numbered anew."""
     return boundary[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
+
+
+def _with_holes_in_faces(
+    positions: np.ndarray,
+    gluing: Gluing,
+    one_sided: np.ndarray,
+    holes: np.ndarray,
+    costs: Callable[[], SeamCosts],
+) -> tuple[np.ndarray, np.ndarray]:
+    """The halfedges (r,) around those `holes` (h,) and around holes in faces, and the number (r,) of the hole of each:
+    no seam has to begin there, nor to lead there. positions (n,3) : in a unit box"""
+    boundary, loop = _boundaries(gluing, one_sided)
+    if len(boundary) == 0:
+        return boundary, boundary
+    a, b = gluing.ends(boundary)
+    around = np.bincount(loop, lengths(positions[a] - positions[b]))
+    component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
+    area = np.bincount(component_of, face_areas(positions, triangles))
+    first_of = boundary[np.unique(loop, return_index=True)[1]]
+    hole = around <= SHORT * np.sqrt(area[component_of[first_of // 3]])
+    if hole.any():  # Hardly any mesh has one, and to find its face takes a while.
+        known, count = costs(), np.bincount(loop)
+        hole &= np.bincount(loop, known.in_face[a]) == count
+        within = np.bincount(loop, known.within_face[a]) > count / 2
+        hole &= within | _opens(positions, a, b, loop, face_normals(positions, triangles)[boundary // 3], known)
+    hole[loop[np.isin(boundary, holes)]] = True
+    return _chosen(boundary, loop, hole)
+
+
+def _opens(
+    positions: np.ndarray, a: np.ndarray, b: np.ndarray, loop: np.ndarray, normals: np.ndarray, costs: SeamCosts
+) -> np.ndarray:
+    """Holes (l,) bool in something smooth that look to the front, from their sides (r,), numbers (r,) and the normals
+    (r,3) of the triangles at them."""
+
+    def sums(of: np.ndarray) -> np.ndarray:
+        return np.stack([np.bincount(loop, x) for x in of.T], axis=1)
+
+    count = np.bincount(loop)[:, None]
+    centre = (sums(positions[a]) / count)[loop]
+    # Around the hole as around the triangles at it, the other way round.
+    normal = unit(-sums(np.cross(positions[a] - centre, positions[b] - centre)))
+    smooth = (normal * sums(normals) / count).sum(axis=1) >= SMOOTH
+    return smooth & (normal @ costs.facing.front >= FORWARDS)
 
 
 def _holes(

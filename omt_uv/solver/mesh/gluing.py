@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .geometry import face_areas
 from .topology import graph_components, halfedges, next_corners, pair_keys, pair_up
 
 
@@ -124,6 +125,13 @@ def turn_over(gluing: Gluing, turned: np.ndarray) -> Gluing:
 
     side = gluing.side[renamed(np.arange(3 * len(triangles)))]
     return replace(gluing, triangles=triangles, side=side, first=renamed(gluing.first), second=renamed(gluing.second))
+
+
+def oriented(gluing: Gluing, positions: np.ndarray) -> tuple[Gluing, np.ndarray]:
+    """Gluing in which neighbours look to the same side, and the triangles (m,) bool of components where they cannot."""
+    area = face_areas(positions, gluing.vertex[gluing.triangles])
+    turned, one_sided = orientations(gluing, area)
+    return turn_over(gluing, turned), one_sided
 
 
 def groups(label: np.ndarray) -> list[np.ndarray]:

@@ -44,8 +44,10 @@ PARTLY = 0.5
 EXACTLY = 1.1
 # What a cut that was grown has to win by being made shorter, at most, as a rule a third of it.
 SHORTENED = 0.1
-# Cuts that end in a face are worth so much less.
+# Cuts that end in a face are worth so much less; and those that end within one that has holes, in a mouth or a socket,
+# hardly anything: they have come across it.
 BARRED = 0.3
+WITHIN = 0.03
 # What is searched again is harder than it seemed: on a coarse surface of so many times the vertices, every time, and up
 # to so many times as many as at first.
 FINER = 1.5
@@ -398,10 +400,12 @@ class SeamSearch:
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""
-        face = np.zeros(component.vertex_count, dtype=bool)
+        factor, costs = np.ones(component.vertex_count), self.costs()
         real = component.vertex_ids < len(self.surface.positions)
-        face[real] = self.costs().in_face[component.vertex_ids[real]]
-        return component.tip_factor() * np.where(face, BARRED, 1.0)
+        within = WITHIN if (component.polygons < 0).any() else BARRED
+        barred = np.where(costs.within_face, within, np.where(costs.in_face, BARRED, 1.0))
+        factor[real] = barred[component.vertex_ids[real]]
+        return component.tip_factor() * factor
 
     def _log_density(self, component: CutComponent, coarse: CoarseSurface) -> np.ndarray | None:
         """Half the logarithm of the density at the vertices (c,) of the coarse surface."""

@@ -207,6 +207,7 @@ def test_reasons_of_vertices_are_steps_between_their_bounds(monkeypatch):
     for v in range(n):
         front = smooth(0.9 * sure * forwards[v], 0.1, 0.6) * (1 - smooth(occlusion[v], 0.5, 0.9))
         hidden = smooth(occlusion[v], 0.05, 0.5) * (1 - front)
+        face = max(front, smooth(0.9 * sure * within[v], 0.1, 0.6))
         expected = {
             "hidden": hidden,
             "crease": smooth(-curvature[v], 4, 20) * (1 - front),
@@ -215,6 +216,7 @@ def test_reasons_of_vertices_are_steps_between_their_bounds(monkeypatch):
             "front": front,
             "salient": 1 - hidden,
             "mirror": 0,
-            "face": max(front, smooth(0.9 * sure * within[v], 0.1, 0.6)),
+            "face": face,
+            "within": face * (occlusion[v] > 0.5),
         }
         assert {name: reason[v] for name, reason in reasons.items()} == pytest.approx(expected, abs=1e-12)

@@ -1,12 +1,16 @@
 """Bodies full of holes: surfaces, tubes and boxes that are sieves, frames, plates with holes right through them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import meshes
 import numpy as np
 import pytest
 from short_cuts import gluing_of
 
 from omt_uv.pipelines.unwrap import _connected_triangles
+from omt_uv.solver.analysis.facing import SceneAxes
+from omt_uv.solver.analysis.seam_costs import SeamPreferences
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.cutting.hole_filling import NO_POLYGON, fill_holes, hole_boundaries
@@ -14,6 +18,7 @@ from omt_uv.solver.errors import NotADiskError
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -255,3 +260,102 @@ def test_one_sided_surfaces_and_few_holes_are_left_alone():
     surface, gluing = triangle_surface(V, F), gluing_of(V, F)
     assert fill_holes(surface, gluing, np.ones(len(F), bool)).holes == 0
     assert fill_holes(surface, gluing, np.zeros(len(F), bool), sieve=32).gluing is gluing
+
+
+# ---- holes in faces -----------------------------------------------------------------------------------------
+
+
+def pierced(*directions, reach=0.15):
+    """A sphere with holes in these directions, and the vertices around each."""
+    V, F = meshes.icosphere(4)
+    near = [(np.linalg.norm(V - np.array(d) / np.linalg.norm(d), axis=1) < reach)[F].any(axis=1) for d in directions]
+    V, F = used(V, F[~np.any(near, axis=0)])
+    loops = boundary_loops(F)
+    borders = [min(loops, key=lambda loop, d=d: -(V[loop].mean(axis=0) @ np.array(d))) for d in directions]
+    return V, F, borders
+
+
+def face_costs(n, front, in_face=True, within=False):
+    """Costs of a surface that is a face to the `front`, all of it or but for the vertices given."""
+    where = np.full(n, within) if isinstance(within, bool) else np.isin(np.arange(n), within)
+    shown = np.full(n, in_face) if isinstance(in_face, bool) else ~np.isin(np.arange(n), in_face)
+    found = SimpleNamespace(in_face=shown, within_face=where, facing=SimpleNamespace(front=np.array(front, float)))
+    return lambda: found
+
+
+def open_ends(V, F, costs, **given):
+    """Boundaries that stay open, as sets of vertices, and what was found."""
+    found = fill_holes(triangle_surface(V, F), gluing_of(V, F), np.zeros(len(F), bool), 32, costs=costs, **given)
+    filled = found.gluing.vertex[found.gluing.triangles]
+    return [set(loop.tolist()) for loop in boundary_loops(filled)], found
+
+
+@pytest.mark.parametrize("size", [1e-120, 1.0, 1e120])
+def test_eyes_are_filled_and_what_looks_to_the_side_is_not(size):
+    V, F, (left, right, side) = pierced((0.4, -1, 0), (-0.4, -1, 0), (1, 0.2, 0))
+    ends, found = open_ends(size * V, F, face_costs(len(V), (0, -1, 0)))
+    assert ends == [set(side.tolist())]
+    # Nobody has to be told.
+    assert found.holes == 0 and len(found.surface.positions) == len(V) + 2
+    assert len(open_ends(size * V, F, None)[0]) == 3
+
+
+def test_the_only_hole_of_a_face_is_filled_too():
+    V, F, _ = pierced((0, -1, 0))
+    assert open_ends(V, F, face_costs(len(V), (0, -1, 0)))[0] == []
+
+
+def test_a_hole_that_reaches_out_of_the_face_stays():
+    V, F, (border,) = pierced((0, -1, 0))
+    assert len(open_ends(V, F, face_costs(len(V), (0, -1, 0), in_face=border[:1]))[0]) == 1
+
+
+def test_a_large_opening_is_no_eye():
+    """Around it is more than half the root of the area."""
+    lengths = []
+    for reach in (0.15, 0.2, 0.25, 0.3):
+        V, F, (border,) = pierced((0, -1, 0), reach=reach)
+        around = np.linalg.norm(V[border] - V[np.roll(border, 1)], axis=1).sum() / np.sqrt(face_areas(V, F).sum())
+        ends, _ = open_ends(V, F, face_costs(len(V), (0, -1, 0)))
+        assert (len(ends) == 0) == (around <= 0.5)
+        lengths.append(around)
+    assert min(lengths) < 0.5 < max(lengths)
+
+
+def test_the_open_end_of_a_tube_is_no_eye_unless_it_lies_within():
+    """Its sides look away from its middle; a throat is like it, but most of its boundary is hidden in the face."""
+    V, F = tube(16, 60, lambda i, j: j < 0)
+    V[:, :2] *= 0.1
+    V, F = used(V, F[(V[F][:, :, 2] < 4).all(axis=1)])
+    top = np.flatnonzero(V[:, 2] > V[:, 2].max() - 1e-9)
+    assert len(open_ends(V, F, face_costs(len(V), (0, 0, 1)))[0]) == 2
+    for hidden, left in ((top[:9], 1), (top[:8], 2)):
+        assert len(open_ends(V, F, face_costs(len(V), (0, 0, 1), within=hidden))[0]) == left
+
+
+def test_costs_are_asked_for_where_there_is_a_short_hole_alone():
+    asked = []
+
+    def costs():
+        asked.append(1)
+        return face_costs(len(V), (0, -1, 0))()
+
+    for reach, times in ((0.5, 0), (0.15, 1)):
+        V, F, _ = pierced((0, -1, 0), reach=reach)
+        open_ends(V, F, costs)
+        assert len(asked) == times
+
+
+def test_seams_neither_begin_in_the_eyes_of_a_head_nor_lead_there():
+    """A head that is its own mirror image, with a nose, and holes for eyes."""
+    V, F, borders = pierced((0.35, -1, 0.2), (-0.35, -1, 0.2))
+    nose = np.exp(-40 * (V[:, 0] ** 2 + (V[:, 2] + 0.1) ** 2)) * (V[:, 1] < 0)
+    V = V * [0.8, 1, 1.2] - 0.5 * nose[:, None] * [0, 1, 0]
+    options = UnwrapOptions(max_shear=1.35, preferences=SeamPreferences(axes=SceneAxes()))
+    result = drain(unwrap(triangle_surface(V, F), options=options))
+    (chart,) = result.charts
+    assert len(chart.patches) and len(result.seams)
+    assert not np.isin(result.seams, np.concatenate(borders)).any()
+    # Where no seams are searched for the shear, holes are joined by the shortest way.
+    plain = drain(unwrap(triangle_surface(V, F)))
+    assert np.isin(plain.seams, np.concatenate(borders)).any()

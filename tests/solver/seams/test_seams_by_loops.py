@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -196,7 +197,10 @@ def search_of(**given):
         "spread": np.array([1.0, np.inf, np.inf]),
         "surface": SimpleNamespace(positions=np.zeros((4, 3))),
         "costs": lambda: SimpleNamespace(
-            of=lambda a, b: 1.0 + a + b, plane=None, in_face=np.array([True, False, False, True])
+            of=lambda a, b: 1.0 + a + b,
+            plane=None,
+            in_face=np.array([True, False, False, True]),
+            within_face=np.array([True, False, False, False]),
         ),
     }
     return SeamSearch(**fields | given)
@@ -231,6 +235,10 @@ def test_costs_of_artists_count_at_edges_of_the_surface_alone():
     np.testing.assert_array_equal(component.cost, before)
     tips = search_of()._tip_factor(component)
     np.testing.assert_allclose(tips, np.where(np.isin(component.vertex_ids, [0, 3]), 0.3, 1.0))
+    # Within a face that had holes, which were filled, hardly any is worth its way.
+    polygons = np.r_[component.polygons[:-1], -1]
+    tips = search_of()._tip_factor(replace(component, polygons=polygons))
+    np.testing.assert_allclose(tips, np.array([0.03, 1.0, 1.0, 0.3, 1.0, 1.0])[component.vertex_ids])
 
 
 @pytest.mark.parametrize("residual, worth", [(None, 1.5), (0.0, 1.5), (99.0, 1.0)])
