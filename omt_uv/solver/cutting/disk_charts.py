@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..analysis.seam_costs import SeamCosts
 from ..errors import (
     DISSOLVE,
     DuplicateFaceError,
@@ -76,7 +78,8 @@ def disk_charts(
         one that has many handles comes apart, see `handle_partition.partition_pairs`
     avoid : (n,) in [0,1], vertices to keep free of seams
     extremities : tips that a surface is cut open through, at most, where "auto" cuts; 0 for the fastest cuts
-    search : finds the seams of components that "auto" may cut, and that have no net
+    search : finds the seams of components that "auto" may cut, and that have no net; with "existing" it tells the holes
+        in faces, which are filled where another boundary is left
 
     Raises
     ------
@@ -86,7 +89,7 @@ def disk_charts(
     if seams not in (*SEAMS, OUTLINED):
         raise ValueError(f"seams must be one of {', '.join((*SEAMS, OUTLINED))}, not {seams!r}")
     if seams == "existing":
-        return _existing(surface, faces, fill_holes, sieve)
+        return _existing(surface, faces, fill_holes, sieve, None if search is None else search.costs)
     faces, triangles, owner = _with_some_area(surface, faces)
     repaired = repaired_gluing(surface, faces, triangles, owner)
     options: dict[str, Any] = {
@@ -124,24 +127,38 @@ def _all_lines(points: np.ndarray) -> bool:
     return not (lengths(cross3(side[:, 1], side[:, 2])) > 0).any()
 
 
-def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> DiskCharts:
+def _existing(
+    surface: Surface,
+    faces: np.ndarray | None,
+    fill: bool,
+    sieve: int | None,
+    costs: Callable[[], SeamCosts] | None,
+) -> DiskCharts:
     """Charts along the seams alone; what is broken is repaired as where seams are added, and said."""
     try:
-        return _filled(surface, strict_gluing(surface, faces), fill, sieve, ())
+        return _filled(surface, strict_gluing(surface, faces), fill, sieve, costs)
     except BROKEN:
         found = uncut(surface, repaired_gluing(surface, *_with_some_area(surface, faces)))
         if found is None:
             # No seam was made to open what has one side only.
             raise
-        return _filled(found.surface, found.gluing, fill, sieve, found.cuts.warnings)
+        return _filled(found.surface, found.gluing, fill, sieve, costs, found.cuts.warnings)
 
 
-def _filled(surface: Surface, gluing: Gluing, fill: bool, sieve: int | None, told: tuple[str, ...]) -> DiskCharts:
+def _filled(
+    surface: Surface,
+    gluing: Gluing,
+    fill: bool,
+    sieve: int | None,
+    costs: Callable[[], SeamCosts] | None,
+    told: tuple[str, ...] = (),
+) -> DiskCharts:
     """Charts of a gluing that is not cut, with its holes filled, all or those of sieves, and what was said of it."""
     positions = surface.positions[surface.corner_vertex[gluing.triangles]] / 2
     extent, holes = 2 * float(extents(positions.reshape(-1, 3)).max()), 0
     if fill or sieve is not None:
-        filled = fill_holes_of(surface, gluing, np.zeros(len(gluing.triangles), dtype=bool), None if fill else sieve)
+        every = np.zeros(len(gluing.triangles), dtype=bool)
+        filled = fill_holes_of(surface, gluing, every, None if fill else sieve, costs=costs, closing=False)
         surface, gluing, holes = filled.surface, filled.gluing, filled.holes
     charts, flat = _sound(charts_of(surface, gluing), extent)
     sieves = () if fill or not holes else (sieved(holes),)

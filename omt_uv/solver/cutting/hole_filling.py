@@ -15,8 +15,8 @@ from ..analysis.seam_costs import SeamCosts
 from ..errors import plural
 from ..mesh.geometry import face_areas, face_normals, lengths, unit
 from ..mesh.gluing import Gluing, components, corner_classes
-from ..mesh.surface import Surface
-from ..mesh.topology import graph_components, halfedges
+from ..mesh.surface import Surface, is_seam
+from ..mesh.topology import graph_components, halfedges, pair_keys
 from .component import NOISE
 from .gluing_facts import in_unit_box, total_curvature
 
@@ -55,19 +55,21 @@ def fill_holes(
     sieve: int | None = None,
     whole: np.ndarray | None = None,
     costs: Callable[[], SeamCosts] | None = None,
+    closing: bool = True,
 ) -> Filled:
     """Fill all boundaries but the longest of every component of an oriented gluing.
 
     one_sided : (m,) triangles that are left alone
     sieve : fill only where there are more than so many holes, and leave outer boundaries open
     whole : (m,) triangles of components that are filled all the same
-    costs : gives those of seams; holes in a face are filled all the same, the longest, too
+    costs : gives those of seams; holes in a face are filled all the same
+    closing : the last boundary of a component, too, unless some of its seams were marked
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
     boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, whole)
     counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
     if costs is not None:
-        boundary, loop = _with_holes_in_faces(in_unit_box(surface, gluing)[0], gluing, one_sided, boundary, costs)
+        boundary, loop = _with_holes_in_faces(surface, gluing, one_sided, boundary, costs, closing)
     if len(boundary) == 0:
         return Filled(surface, gluing, 0)
     filled = _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
@@ -128,24 +130,30 @@ def _chosen(boundary: np.ndarray, loop: np.ndarray, hole: np.ndarray) -> tuple[n
 
 
 def _with_holes_in_faces(
-    positions: np.ndarray,
+    surface: Surface,
     gluing: Gluing,
     one_sided: np.ndarray,
     holes: np.ndarray,
     costs: Callable[[], SeamCosts],
+    closing: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The halfedges (r,) around those `holes` (h,) and around holes in faces, and the number (r,) of the hole of each:
-    no seam has to begin there, nor to lead there. positions (n,3) : in a unit box"""
+    no seam has to begin there, nor to lead there."""
     boundary, loop = _boundaries(gluing, one_sided)
     if len(boundary) == 0:
         return boundary, boundary
-    a, b = gluing.ends(boundary)
+    (a, b), positions = gluing.ends(boundary), in_unit_box(surface, gluing)[0]
     around = np.bincount(loop, lengths(positions[a] - positions[b]))
     component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
     area = np.bincount(component_of, face_areas(positions, triangles))
-    first_of = boundary[np.unique(loop, return_index=True)[1]]
-    hole = around <= SHORT * np.sqrt(area[component_of[first_of // 3]])
-    if hole.any():  # Hardly any mesh has one, and to find its face takes a while.
+    at = component_of[boundary[np.unique(loop, return_index=True)[1]] // 3]
+    hole = around <= SHORT * np.sqrt(area[at])
+    if not closing or len(surface.seams):
+        order = np.lexsort((-around, at))
+        last = order[np.unique(at[order], return_index=True)[1]]
+        marked = component_of[boundary[is_seam(surface, pair_keys(a, b))] // 3]
+        hole[last[np.isin(at[last], marked) | (not closing)]] = False
+    if hole.any():  # Few meshes have one, and to find its face takes a while.
         known, count = costs(), np.bincount(loop)
         hole &= np.bincount(loop, known.in_face[a]) == count
         within = np.bincount(loop, known.within_face[a]) > count / 2
@@ -168,7 +176,8 @@ def _opens(
     # Around the hole as around the triangles at it, the other way round.
     normal = unit(-sums(np.cross(positions[a] - centre, positions[b] - centre)))
     smooth = (normal * sums(normals) / count).sum(axis=1) >= SMOOTH
-    return smooth & (normal @ costs.facing.front >= FORWARDS)
+    # What looks to the back is in no face; but a body may be inside out.
+    return smooth & (np.abs(normal @ costs.facing.front) >= FORWARDS)
 
 
 def _holes(

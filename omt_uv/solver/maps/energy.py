@@ -75,7 +75,7 @@ class Elements:
     polygon: np.ndarray | None = None
     lone: np.ndarray | None = None
     quads: Quads | None = None
-    _last: LastAnswer = field(default_factory=LastAnswer, repr=False, compare=False)
+    _last: LastAnswer = field(default_factory=LastAnswer, init=False, repr=False, compare=False)
 
     @property
     def gradient(self) -> np.ndarray:

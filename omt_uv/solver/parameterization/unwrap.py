@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ..analysis.density import Target
 from ..analysis.facing import SceneAxes
-from ..analysis.seam_costs import SeamPreferences
+from ..analysis.seam_costs import SeamPreferences, seam_costs
 from ..canonical.markers import MapMarkers, markers_of_chart
-from ..cutting.cuts import Cuts
+from ..cutting.cuts import Cuts, SeamFinder
 from ..cutting.cuts import cut as cut_surface
 from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
@@ -220,11 +221,20 @@ def cut_charts(
     bound = options.shear_bound()
     given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
     search = None if bound is None else ShearSearch(surface, faces, bound, target, given, rehearsal(options))
-    finder = None if search is None else search.search(search.first_spread())
+    finder = _faces_of(surface, faces, options) if search is None else search.search(search.first_spread())
     seams = OUTLINED if options.seams == "auto" and options.boundary != "free" else options.seams
     prepared = yield from disk_charts(surface, faces, seams=seams, search=finder, **given)
     prepared = yield from cut_alike(surface, faces, prepared, given)
     return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
+
+
+def _faces_of(surface: Surface, faces: np.ndarray | None, options: UnwrapOptions) -> SeamFinder | None:
+    """What tells the holes in faces, where the seams there are may be those that a search has left; else None."""
+    if options.seams != "existing" or options.boundary != "free":
+        return None
+    from ..seams.search import SeamSearch
+
+    return SeamSearch(np.zeros(0), surface, cache(lambda: seam_costs(surface, options.preferences, faces)))
 
 
 def rehearsal(options: UnwrapOptions) -> Callable[[Surface, list[Chart], Target | None], Steps[list[ChartMap]]]:

@@ -298,11 +298,25 @@ def test_eyes_are_filled_and_what_looks_to_the_side_is_not(size):
     # Nobody has to be told.
     assert found.holes == 0 and len(found.surface.positions) == len(V) + 2
     assert len(open_ends(size * V, F, None)[0]) == 3
+    # So it is of what is inside out.
+    assert open_ends(size * V, F[:, ::-1], face_costs(len(V), (0, -1, 0)))[0] == ends
 
 
 def test_the_only_hole_of_a_face_is_filled_too():
     V, F, _ = pierced((0, -1, 0))
     assert open_ends(V, F, face_costs(len(V), (0, -1, 0)))[0] == []
+
+
+@pytest.mark.parametrize(
+    "marked, closing, left", [((), True, 0), ((0,), True, 1), ((1,), True, 1), ((0, 1), True, 1), ((), False, 1)]
+)
+def test_the_last_boundary_stays_where_seams_were_marked_or_nothing_is_to_be_cut(marked, closing, left):
+    V, F, loops = pierced((0.4, -1, 0), (-0.4, -1, 0.1))
+    around = [np.column_stack([loops[k], np.roll(loops[k], -1)]) for k in marked]
+    surface = triangle_surface(V, F, np.concatenate(around) if marked else ())
+    none, costs = np.zeros(len(F), bool), face_costs(len(V), (0, -1, 0))
+    found = fill_holes(surface, gluing_of(V, F), none, 32, costs=costs, closing=closing)
+    assert len(boundary_loops(found.gluing.vertex[found.gluing.triangles])) == left
 
 
 def test_a_hole_that_reaches_out_of_the_face_stays():
@@ -356,6 +370,10 @@ def test_seams_neither_begin_in_the_eyes_of_a_head_nor_lead_there():
     (chart,) = result.charts
     assert len(chart.patches) and len(result.seams)
     assert not np.isin(result.seams, np.concatenate(borders)).any()
+    # Its seams may be marked: they cut it into a disk, with the same holes in it.
+    marked = triangle_surface(V, F, result.seams)
+    (again,) = drain(unwrap(marked, options=replace(options, seams="existing"))).charts
+    assert len(again.patches) == len(chart.patches) and set(again.faces) == set(chart.faces)
     # Where no seams are searched for the shear, holes are joined by the shortest way.
     plain = drain(unwrap(triangle_surface(V, F)))
     assert np.isin(plain.seams, np.concatenate(borders)).any()

@@ -194,17 +194,18 @@ def test_maps_stay_where_a_free_boundary_has_none(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("options", "seams", "searches"),
+    ("options", "seams", "searches", "knows_faces"),
     [
-        ({}, "auto", False),
-        ({"max_shear": 1.3}, "auto", True),
-        ({"boundary": "disk"}, unwrapping.OUTLINED, False),
-        ({"boundary": "disk", "seams": "existing"}, "existing", False),
-        ({"seams": "existing", "max_shear": 1.3}, "existing", False),
-        ({"fill_holes": True}, "auto", False),
+        ({}, "auto", False, False),
+        ({"max_shear": 1.3}, "auto", True, True),
+        ({"boundary": "disk"}, unwrapping.OUTLINED, False, False),
+        ({"boundary": "disk", "seams": "existing"}, "existing", False, False),
+        ({"seams": "existing", "max_shear": 1.3}, "existing", False, True),
+        ({"seams": "existing"}, "existing", False, True),
+        ({"fill_holes": True}, "auto", False, False),
     ],
 )
-def test_charts_are_cut_as_the_options_say(options, seams, searches, monkeypatch):
+def test_charts_are_cut_as_the_options_say(options, seams, searches, knows_faces, monkeypatch):
     asked = []
 
     def disk_charts(surface, faces, *, seams, search, **given):
@@ -214,7 +215,7 @@ def test_charts_are_cut_as_the_options_say(options, seams, searches, monkeypatch
     monkeypatch.setattr(unwrapping, "disk_charts", disk_charts)
     monkeypatch.setattr(unwrapping, "cut_alike", lambda surface, faces, prepared, given: done(prepared))
     found = drain(unwrapping.cut_charts(surface(), options=UnwrapOptions(**options)))
-    assert asked == [(seams, searches, options.get("fill_holes", False), unwrapping.MANY)]
+    assert asked == [(seams, knows_faces, options.get("fill_holes", False), unwrapping.MANY)]
     assert (found.search is not None) == searches and len(found.joined) == 1 and not found.maps
 
 
