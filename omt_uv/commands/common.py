@@ -7,7 +7,7 @@ import gc
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 from .. import __version__
@@ -90,19 +90,11 @@ def refusals(objects: Sequence = (), name: str = "", others: tuple[type[Exceptio
         raise CommandError(str(error)) from error
 
 
-@contextmanager
-def blaming(pairs: list) -> Iterator[None]:
-    """Name the first object, of pairs of object and Reading that a block measures as one, that has no measure."""
-    from ..pipelines.distortion import measure_readings
-    from ..solver.errors import MeshError
+def blaming(pairs: list) -> AbstractContextManager[None]:
+    """Refuse the first object, of pairs of object and Reading that a block measures as one, without a measure."""
+    from ..pipelines import distortion
 
-    try:
-        yield
-    except MeshError:
-        for obj, reading in pairs:
-            with refusals(name=obj.name):
-                measure_readings([reading])
-        raise
+    return distortion.blaming(pairs, lambda obj: refusals(name=obj.name))
 
 
 def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = None) -> None:

@@ -9,7 +9,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 
@@ -156,19 +156,11 @@ def complaints(about=None, objects: Sequence = (), others: tuple[type[Exception]
         raise Complaint(str(error)) from error
 
 
-@contextmanager
-def blaming(pairs: list) -> Iterator[None]:
-    """Name the first object, of pairs of object and Reading that a block measures as one, that has no measure."""
-    from ..pipelines.distortion import measure_readings
-    from ..solver.errors import MeshError
+def blaming(pairs: list) -> AbstractContextManager[None]:
+    """Complain of the first object, of pairs of object and Reading that a block measures as one, without a measure."""
+    from ..pipelines import distortion
 
-    try:
-        yield
-    except MeshError:
-        for obj, reading in pairs:
-            with complaints(obj):
-                measure_readings([reading])
-        raise
+    return distortion.blaming(pairs, complaints)
 
 
 def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Complaint) -> set[str]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ..solver.errors import EmptyMeshError
+from ..solver.errors import EmptyMeshError, MeshError
 from ..solver.maps.distortion import NEGLIGIBLE_AREA, Distortion, distortion, face_distortion
 from ..solver.maps.embedding import check_layout
 from ..solver.mesh.geometry import face_areas
@@ -142,3 +144,20 @@ def _of_each(polygons: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray, i
     """Those of the polygons (k,) that belong to each reading, and the number of its first one."""
     starts = [0, *ends[:-1].tolist()]
     return [(polygons[(polygons >= a) & (polygons < b)], a) for a, b in zip(starts, ends.tolist(), strict=True)]
+
+
+@contextmanager
+def blaming(
+    pairs: Sequence[tuple[Any, Reading]], about: Callable[[Any], AbstractContextManager[None]]
+) -> Iterator[None]:
+    """Name the first object, of pairs of object and Reading that a block measures as one, that has no measure.
+
+    about : a block whose errors are about an object
+    """
+    try:
+        yield
+    except MeshError:
+        for obj, reading in pairs:
+            with about(obj):
+                measure_readings([reading])
+        raise

@@ -12,8 +12,7 @@ import numpy as np
 import operator_runs
 import pytest
 import scenes
-
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+from operator_runs import numbers
 
 
 @pytest.fixture(scope="module")
@@ -21,19 +20,12 @@ def uvs(package):
     return operator_runs.some_uvs()
 
 
-def numbers(text):
-    return [float(x) for x in NUMBER.findall(text)]
-
-
 @pytest.fixture
 def told(package, capfd):
     """Run an operator: the words that it reports, its warnings, and the rows it leaves in the panel."""
 
     def run(name, **arguments):
-        capfd.readouterr()
-        module, verb = name.split(".")
-        assert getattr(getattr(bpy.ops, module), verb)(**arguments) == {"FINISHED"}
-        lines = capfd.readouterr().out.splitlines()
+        lines = operator_runs.lines_told(capfd, name, **arguments)
         said, warned = (
             [line.removeprefix(kind) for line in lines if line.startswith(kind)] for kind in ("Info: ", "Warning: ")
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +11,7 @@ import numpy as np
 import plain_figures as plain
 import pytest
 import scenes
+from operator_runs import lines_told, numbers
 from sphere_shapes import blob
 
 
@@ -20,18 +20,11 @@ def said(package, capfd):
     """Run an operator: the numbers of the words it reports, and the rows it leaves in the panel."""
 
     def run(name, **arguments):
-        capfd.readouterr()
-        module, verb = name.split(".")
-        assert getattr(getattr(bpy.ops, module), verb)(**arguments) == {"FINISHED"}
-        told = [line for line in capfd.readouterr().out.splitlines() if line.startswith("Info: ")]
+        told = [line for line in lines_told(capfd, name, **arguments) if line.startswith("Info: ")]
         summary = package("session.last_run").state.summary
         return numbers(" ".join(told)), dict(summary.rows) if summary else {}
 
     return run
-
-
-def numbers(text):
-    return [float(x) for x in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text)]
 
 
 def squares():

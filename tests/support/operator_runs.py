@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import bpy
@@ -89,3 +90,16 @@ def call(name: str, group: str = "region") -> None:
     given = {key: group if key in GROUPS and value == "region" else value for key, value in arguments.items()}
     module, verb = operator.split(".")
     assert getattr(getattr(bpy.ops, module), verb)("EXEC_DEFAULT", True, **given) == {"FINISHED"}
+
+
+def lines_told(capfd, name, **arguments):
+    """Run an operator to its end: the lines that it printed."""
+    capfd.readouterr()
+    module, verb = name.split(".")
+    assert getattr(getattr(bpy.ops, module), verb)(**arguments) == {"FINISHED"}
+    return capfd.readouterr().out.splitlines()
+
+
+def numbers(text):
+    """The numbers in a text."""
+    return [float(x) for x in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text)]

@@ -10,12 +10,13 @@ import numpy as np
 
 from ...errors import UserError
 from ...pipelines.attributes import Attributes, Layer, is_uv, material_borders, uv_seams
+from ...pipelines.reading import check_places
 from ...pipelines.remesh import oriented
 from ...pipelines.shapes.landmark_pairs import Pairs
 from ...pipelines.shapes.match import MatchJob, MatchResult
 from ...solver.analysis.feature_edges import edge_union
 from ...solver.errors import EmptyMeshError
-from ...solver.mesh.surface import Surface, check_finite
+from ...solver.mesh.surface import Surface
 from ...solver.mesh.topology import pair_keys
 from ...solver.registration.results import RegistrationOptions
 from .. import mesh as blender_mesh
@@ -52,7 +53,7 @@ def read_carrier(obj: bpy.types.Object) -> Carried:
     reading = blender_mesh.read_mesh(obj.data, obj)
     if not len(reading.surface.triangles):
         raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
-    check_finite(reading.surface.positions, reading.surface.corner_vertex[reading.surface.triangles])
+    check_places(reading.surface)
     sides = oriented(reading.surface)
     stretch = blender_mesh.stretch(obj)
     if blender_mesh.is_flattened(stretch):

@@ -66,10 +66,14 @@ def fill_holes(
     closing : the last boundary of a component, too, unless some of its seams were marked
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
-    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, whole)
-    counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
+    boundary, loop = _boundaries(gluing, one_sided)
+    if len(boundary) == 0:
+        return Filled(surface, gluing, 0)
+    hole = _holes(surface.positions, gluing, boundary, loop, sieve, whole)
+    counted = len(np.unique(loop[hole[loop] & (True if whole is None else ~whole[boundary // 3])]))
     if costs is not None:
-        boundary, loop = _with_holes_in_faces(surface, gluing, one_sided, boundary, costs, closing)
+        hole |= _in_faces(surface, gluing, boundary, loop, costs, closing)
+    boundary, loop = _chosen(boundary, loop, hole)
     if len(boundary) == 0:
         return Filled(surface, gluing, 0)
     filled = _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
@@ -129,19 +133,15 @@ def _chosen(boundary: np.ndarray, loop: np.ndarray, hole: np.ndarray) -> tuple[n
     return boundary[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
 
 
-def _with_holes_in_faces(
+def _in_faces(
     surface: Surface,
     gluing: Gluing,
-    one_sided: np.ndarray,
-    holes: np.ndarray,
+    boundary: np.ndarray,
+    loop: np.ndarray,
     costs: Callable[[], SeamCosts],
     closing: bool,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The halfedges (r,) around those `holes` (h,) and around holes in faces, and the number (r,) of the hole of each:
-    no seam has to begin there, nor to lead there."""
-    boundary, loop = _boundaries(gluing, one_sided)
-    if len(boundary) == 0:
-        return boundary, boundary
+) -> np.ndarray:
+    """Loops (l,) bool that are holes in faces: no seam has to begin there, nor to lead there."""
     (a, b), positions = gluing.ends(boundary), in_unit_box(surface, gluing)[0]
     around = np.bincount(loop, lengths(positions[a] - positions[b]))
     component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
@@ -158,8 +158,7 @@ def _with_holes_in_faces(
         hole &= np.bincount(loop, known.in_face[a]) == count
         within = np.bincount(loop, known.within_face[a]) > count / 2
         hole &= within | _opens(positions, a, b, loop, face_normals(positions, triangles)[boundary // 3], known)
-    hole[loop[np.isin(boundary, holes)]] = True
-    return _chosen(boundary, loop, hole)
+    return hole
 
 
 def _opens(
