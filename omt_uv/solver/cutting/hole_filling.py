@@ -66,14 +66,10 @@ def fill_holes(
     closing : the last boundary of a component, too, unless some of its seams were marked
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
-    boundary, loop = _boundaries(gluing, one_sided)
-    if len(boundary) == 0:
-        return Filled(surface, gluing, 0)
-    hole = _holes(surface.positions, gluing, boundary, loop, sieve, whole)
-    counted = len(np.unique(loop[hole[loop] & (True if whole is None else ~whole[boundary // 3])]))
+    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, whole)
+    counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
     if costs is not None:
-        hole |= _in_faces(surface, gluing, boundary, loop, costs, closing)
-    boundary, loop = _chosen(boundary, loop, hole)
+        boundary, loop = _with_holes_in_faces(surface, gluing, one_sided, boundary, costs, closing)
     if len(boundary) == 0:
         return Filled(surface, gluing, 0)
     filled = _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
@@ -133,15 +129,19 @@ def _chosen(boundary: np.ndarray, loop: np.ndarray, hole: np.ndarray) -> tuple[n
     return boundary[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
 
 
-def _in_faces(
+def _with_holes_in_faces(
     surface: Surface,
     gluing: Gluing,
-    boundary: np.ndarray,
-    loop: np.ndarray,
+    one_sided: np.ndarray,
+    holes: np.ndarray,
     costs: Callable[[], SeamCosts],
     closing: bool,
-) -> np.ndarray:
-    """Loops (l,) bool that are holes in faces: no seam has to begin there, nor to lead there."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """The halfedges (r,) around those `holes` (h,) and around holes in faces, and the number (r,) of the hole of each:
+    no seam has to begin there, nor to lead there."""
+    boundary, loop = _boundaries(gluing, one_sided)
+    if len(boundary) == 0:
+        return boundary, boundary
     (a, b), positions = gluing.ends(boundary), in_unit_box(surface, gluing)[0]
     around = np.bincount(loop, lengths(positions[a] - positions[b]))
     component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
@@ -158,7 +158,8 @@ def _in_faces(
         hole &= np.bincount(loop, known.in_face[a]) == count
         within = np.bincount(loop, known.within_face[a]) > count / 2
         hole &= within | _opens(positions, a, b, loop, face_normals(positions, triangles)[boundary // 3], known)
-    return hole
+    hole[loop[np.isin(boundary, holes)]] = True
+    return _chosen(boundary, loop, hole)
 
 
 def _opens(
