@@ -38,7 +38,7 @@ def test_the_matrix_between_motions_is_that_of_the_whole_matrix(seed):
     local = half @ half.transpose(0, 2, 1)
     more = sp.random(2 * n, 2 * n, 0.01, random_state=seed) if seed % 2 else None
     more = None if more is None else (more + more.T).tocsr()
-    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks()(F), local)]), more)
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.places()(F), local)]), more)
     rows.add_diagonal(rng.random(2 * n))
     dense = np.column_stack([rows @ x for x in np.eye(2 * n)])
     np.testing.assert_allclose(dense, dense.T, atol=1e-9)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..mesh.topology import expand, halfedges
+from ..mesh.topology import halfedges
 from .sparse import minimum_degree
 
 # From this many vertices on dissection is the better order of the two; on fewer, minimum degree has less fill.
@@ -47,9 +47,13 @@ class Dissection:
 
 def kd_parts(points: np.ndarray, depth: int) -> np.ndarray:
     """Part (n,) of every point (n,d), of 2^depth parts of the same size, halved across their longest sides."""
-    part = np.zeros(len(points), np.int64)
-    for k in range(depth):
-        part = 2 * part + _upper_half(points, part, 1 << k)
+    # The points of a part, in the order they came in, -1 where there is one more in another.
+    rows = np.arange(len(points), dtype=np.int32)[None]
+    coordinates = np.ascontiguousarray(points.T)
+    for _ in range(depth if len(points) else 0):
+        rows = _halved(coordinates, rows)
+    part, there = np.empty(len(points), np.int64), rows >= 0
+    part[rows[there]] = np.nonzero(there)[0]
     return part
 
 
@@ -67,16 +71,24 @@ def vertex_graph(triangles: np.ndarray, n: int) -> csc_matrix:
     return csc_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
-def _upper_half(points: np.ndarray, part: np.ndarray, count: int) -> np.ndarray:
-    """Which points (k,d) lie in the upper half of their part (k,), by number, along the longest side of its box."""
-    size = np.bincount(part, minlength=count)
-    order = np.argsort(part, kind="stable")
-    first = (np.cumsum(size) - size)[size > 0]
-    sorted_points = points[order]
-    extent = np.zeros((count, points.shape[1]))
-    extent[size > 0] = np.maximum.reduceat(sorted_points, first) - np.minimum.reduceat(sorted_points, first)
-    along = points[np.arange(len(points)), extent.argmax(axis=1)[part]]
-    order = np.lexsort((along, part))
-    rank = np.empty(len(points), np.int64)
-    rank[order] = expand(size)[1]
-    return rank >= (size // 2)[part]
+def _halved(coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """The points of the lower and the upper half of each part, (2p,s), by coordinates (d,n) and those of parts (p,r).
+
+    Parts are sorted each by itself, which takes a third of the time of all at once.
+    """
+    there = rows >= 0
+    size = there.sum(axis=1)
+    # Longest sides do not change where a point is there twice.
+    box = coordinates[:, np.where(there, rows, np.maximum(rows[:, :1], 0))]
+    along = box[(box.max(axis=2) - box.min(axis=2)).argmax(axis=0), np.arange(len(rows))]
+    del box
+    along[~there] = np.inf
+    order = np.argsort(along, axis=1, kind="stable")
+    lower = np.zeros(rows.shape, bool)
+    np.put_along_axis(lower, order, np.arange(rows.shape[1]) < (size // 2)[:, None], axis=1)
+    sizes = np.column_stack([size // 2, size - size // 2])
+    found = np.full((len(rows), 2, int(sizes.max(initial=0))), -1, np.int32)
+    kept = np.arange(found.shape[2]) < sizes[:, :, None]
+    for half, some in enumerate((lower, ~lower & there)):
+        found[:, half][kept[:, half]] = rows[some]
+    return found.reshape(2 * len(rows), -1)

@@ -9,6 +9,7 @@ of a vertex share their columns, which halves what these take.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -17,6 +18,7 @@ import scipy.sparse as sp
 
 from ..errors import PrecisionError
 from ..freed_memory import give_back_often
+from ..mesh.topology import order_of_numbers
 
 # Cells whose pairs of corners are numbered at a time.
 AT_ONCE = 100_000
@@ -48,12 +50,9 @@ class RowPattern:
         later = column - self.first[1:].astype(np.int32)[colour[self.order[row]]]
         self.columns = (2 * later[:, None] + np.arange(2, dtype=np.int32)).ravel()
 
-    def blocks(self) -> Callable[[np.ndarray], np.ndarray]:
-        """What finds the blocks (c, k (k + 1) / 2) of the pairs of corners of some cells (c,k), see `corner_pairs`.
-
-        b + v is that of vertex v with itself, and ~k block k where the second corner comes before the first. Those of
-        all cells at once take as much memory as the mesh.
-        """
+    def places(self) -> Callable[[np.ndarray], BlockPlaces]:
+        """What finds where the blocks of some cells (c,k) belong. For all cells at once that takes as much memory as
+        the mesh."""
         n, key = len(self.order), np.empty(self.count, np.int64)
         place = np.empty(n, np.int32)
         place[self.order] = np.arange(n)
@@ -62,13 +61,21 @@ class RowPattern:
             row = np.repeat(np.arange(begin, end), np.diff(self.start[begin : end + 1]))
             here = slice(self.start[begin], self.start[end])
             key[here] = self.columns[::2][here] // 2 + (n * row + end)
+        seen, number = np.zeros(len(key) + n, bool), np.empty(len(key) + n, np.int32)
 
-        def of(cells: np.ndarray) -> np.ndarray:
-            one, other = (place[cells[:, side]] for side in corner_pairs(cells.shape[1]))
+        def of(cells: np.ndarray) -> BlockPlaces:
+            first, second = corner_pairs(cells.shape[1])
+            one, other = place[cells.T[first]], place[cells.T[second]]
             # The key of a vertex with itself is none: what it comes to is of no use.
             found = np.searchsorted(key, _keys(one, other, n)).astype(np.int32)
-            found = np.where(one > other, ~found, found)
-            return np.where(one == other, np.int32(len(key)) + one, found)
+            found = np.where(one == other, np.int32(len(key)) + one, found)
+            seen[found] = True
+            touched = np.flatnonzero(seen).astype(np.int32)
+            seen[touched] = False
+            number[touched] = np.arange(len(touched))
+            # Two corners may be one vertex, where others follow it.
+            alike = (one == other) & (first != second)[:, None]
+            return BlockPlaces(touched, number[found], one > other, alike if alike.any() else None)
 
         return of
 
@@ -80,6 +87,20 @@ class RowPattern:
     def count(self) -> int:
         """Blocks b of two vertices."""
         return len(self.columns) // 2
+
+
+@dataclass(frozen=True)
+class BlockPlaces:
+    """Where the blocks of the pairs of corners of some cells (c,k) belong, see `corner_pairs`: (p,c) each.
+
+    touched (t,) : blocks of the pattern that there are, b + v that of vertex v with itself; number : which of these
+    turned : whether the second corner comes before the first; alike : whether both are one vertex, None where none are
+    """
+
+    touched: np.ndarray
+    number: np.ndarray
+    turned: np.ndarray
+    alike: np.ndarray | None
 
 
 def corner_pairs(k: int) -> tuple[np.ndarray, np.ndarray]:
@@ -151,31 +172,24 @@ class VertexRows:
         self._more = None if more is None else more.tocsr()[unknowns][:, unknowns].tocsr()
 
     @staticmethod
-    def summed(pattern: RowPattern, parts: Iterable[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    def summed(pattern: RowPattern, parts: Iterable[tuple[BlockPlaces, np.ndarray]]) -> np.ndarray:
         """The data (2,b + n,2) of a matrix: by axis of the row, block, and axis of the column.
 
-        parts : the blocks (c,p) of the pattern that belong to some cells, and what these cells add, (c,2k,2k) symmetric
+        parts : where the blocks of some cells belong, and what these cells add, (c,2k,2k) symmetric
         """
         data = np.zeros((2, pattern.count + len(pattern.order), 2))
-        seen, number = np.zeros(data.shape[1], bool), np.empty(data.shape[1], np.int32)
-        for ids, blocks in parts:
-            k = blocks.shape[1] // 2
-            one, other = corner_pairs(k)
-            turned = ids < 0
-            flat = np.where(turned, ~ids, ids).ravel()
-            seen[flat] = True
-            touched = np.flatnonzero(seen)
-            seen[touched] = False
-            number[touched] = np.arange(len(touched))
-            local = number[flat].astype(np.intp)
-            # Two corners may be one vertex, where others follow it.
-            alike = (ids >= pattern.count) & (one != other)
-            cells = blocks.reshape(len(blocks), k, 2, k, 2)
-            for p in range(2):
-                for q in range(2):
-                    here, across = cells[:, one, p, other, q], cells[:, one, q, other, p]
-                    values = np.where(turned, across, here) + np.where(alike, across, 0)
-                    data[p, touched, q] += np.bincount(local, values.ravel(), len(touched))
+        for places, blocks in parts:
+            one, other = corner_pairs(blocks.shape[1] // 2)
+            cells, count = blocks.transpose(1, 2, 0), len(places.touched)
+            number = places.number.ravel().astype(np.intp)
+            here = {(p, q): cells[2 * one + p, 2 * other + q] for p in range(2) for q in range(2)}
+            for (p, q), values in here.items():
+                across = here[q, p]
+                if p != q:
+                    values = np.where(places.turned, across, values)
+                if places.alike is not None:
+                    values = values + np.where(places.alike, across, 0)
+                data[p, places.touched, q] += np.bincount(number, values.ravel(), count)
         return data
 
     def add_diagonal(self, diagonal: np.ndarray) -> None:
@@ -372,3 +386,20 @@ def _distinct_keys(cells: Sequence[np.ndarray], n: int) -> np.ndarray:
     kept = np.ones(len(key), bool)
     kept[1:] = key[1:] != key[:-1]
     return key[kept]
+
+
+def numbered_pairs(cells: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns (p,) and rows (p,) of the pairs of corners of cells (c,k), each once, column by column; and the number of
+    every pair of every cell, cell by cell and row by row of their blocks."""
+    several = [c.astype(np.int32, copy=False) for c in cells]
+    column = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in several])
+    row = np.concatenate([np.repeat(c, c.shape[1], axis=1).ravel() for c in several])
+    # By rows first, the columns then keep their order.
+    order = order_of_numbers(row)
+    order = order[order_of_numbers(column[order])].astype(np.int32)
+    column, row = column[order], row[order]
+    begins = np.ones(len(order), bool)
+    begins[1:] = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
+    number = np.empty(len(order), np.int32)
+    number[order] = np.cumsum(begins, dtype=np.int32) - 1
+    return column[begins], row[begins], number

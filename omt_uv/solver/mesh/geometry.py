@@ -12,7 +12,7 @@ LEAST_STIFFNESS = 1e-3
 # Rows of arrays that are worked on at a time, so few that what is computed from them stays in the cache.
 CHUNK = 1 << 14
 # Triangles whose gradients are kept: of more, the sides that make them, which take half of the memory.
-KEPT_HATS = 400_000
+KEPT_HATS = 1_200_000
 
 
 def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ four triangles of a quad and of its area share four vertices, and make one block
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import overload
 
@@ -19,7 +19,7 @@ from ..linalg.kept_factor import KeptFactor
 from ..linalg.nested_dissection import LARGE, vertex_graph
 from ..linalg.sparse import FillOrder, minimum_degree
 from ..linalg.symmetric_sweeps import SymmetricSweeps
-from ..linalg.vertex_rows import RowPattern, VertexRows
+from ..linalg.vertex_rows import BlockPlaces, RowPattern, VertexRows, numbered_pairs
 from ..maps.energy import (
     Elements,
     area_forms_of,
@@ -32,7 +32,6 @@ from ..maps.energy import (
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import in_turn, restricted
 from ..mesh.polygon_areas import BOTH
-from ..mesh.topology import order_of_numbers
 
 # Triangles whose blocks are found at a time: what is found on the way stays in the processor's cache.
 CHUNK = 8192
@@ -47,10 +46,13 @@ AT_ONCE = 100_000
 FEW_AT_ONCE = 1 << 14
 # Pairs of corners of all cells up to which it is kept where each entry of a block belongs.
 MOST_PAIRS = 2 * 9 * AT_ONCE
+# Vertices up to which it is kept where blocks belong: of more, that takes as long as the memory is worth.
+MOST_PLACED = 800_000
 # Axes of row and column within the block of two vertices.
 AXES = ((0, 0), (1, 0), (0, 1), (1, 1))
 Matrix = sp.spmatrix | VertexRows
 Solver = SymmetricSweeps | AdditiveSchwarz | KeptFactor
+_BothPlaces = tuple[BlockPlaces | None, BlockPlaces | None]
 
 
 class Assembly:
@@ -70,7 +72,7 @@ class Assembly:
         self.parts, self.order = parts, FillOrder()
         cells = [triangles] if quads is None or not len(quads) else [triangles, quads]
         # The diagonal, too: a vertex may follow another, and be in no cell.
-        column, row, number = _numbered_pairs([*cells, np.arange(n)[:, None]], n)
+        column, row, number = numbered_pairs([*cells, np.arange(n)[:, None]], n)
         # What is kept between steps takes half of the memory that it is computed in.
         self._block = number[: len(number) - n]
         degree = np.bincount(column, minlength=n)
@@ -150,31 +152,47 @@ class RowAssembly:
     def __init__(self, triangles: np.ndarray, n: int, parts: SymmetricSweeps, quads: np.ndarray):
         self.parts, self.order = parts, FillOrder()
         self._pattern = RowPattern([triangles, quads], n)
+        self._places: list[_BothPlaces] | None = None
 
     def hessian(
         self, faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None = None
     ) -> Hessian:
         """The Hessian of the energy, see `hessian_blocks`."""
         give_back_of(len(w))
-        place = np.arange(len(w)) if symmetry is None else symmetry.representative
         gradient, rest, scale = np.zeros(len(w), complex), None, 0.0
+        places, turned = self._places_of(faces, symmetry), _turned_vertices(axes, symmetry)
 
-        def blocks() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        def blocks() -> Iterator[tuple[BlockPlaces, np.ndarray]]:
             nonlocal rest, scale
-            of_cells = self._pattern.blocks()
-            for some, here, _, _ in in_turn(faces, FEW_AT_ONCE):
+            for (some, here, _, _), (lone, four) in zip(in_turn(faces, FEW_AT_ONCE), places, strict=True):
                 of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
-                found = _blocks_at_once(some, w, of, kept, axes, symmetry, gradient)
+                found = _blocks_at_once(some, w, of, kept, (*axes, turned), symmetry, gradient)
                 scale += found.scale
                 rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
-                if len(found.triangles):
-                    yield of_cells(place[some.triangles[: lone_triangles(some)]]), found.triangles
-                if found.quads is not None and len(found.quads):
-                    yield of_cells(place[corners_of_quads(some)]), found.quads
+                if lone is not None:
+                    yield lone, found.triangles
+                if four is not None and found.quads is not None:
+                    yield four, found.quads
 
         data = VertexRows.summed(self._pattern, blocks())
         gradient = gradient if symmetry is None else symmetry.folded(gradient)
         return Hessian(gradient, lambda diagonal, more: self._matrix(data, diagonal, more), rest, scale)
+
+    def _places_of(self, faces: Elements, symmetry: MirrorSymmetry | None) -> Iterable[_BothPlaces]:
+        """Where the blocks of the lone triangles and of the quads of some polygons after the others belong."""
+        if self._places is not None:
+            return self._places
+        of_cells = self._pattern.places()
+
+        def places(cells: np.ndarray) -> BlockPlaces | None:
+            return of_cells(cells if symmetry is None else symmetry.representative[cells]) if len(cells) else None
+
+        some = (given[0] for given in in_turn(faces, FEW_AT_ONCE))
+        found = ((places(x.triangles[: lone_triangles(x)]), places(corners_of_quads(x))) for x in some)
+        if len(self._pattern.order) > MOST_PLACED:
+            return found
+        self._places = list(found)
+        return self._places
 
     def _matrix(self, data: np.ndarray, diagonal: np.ndarray, more: sp.spmatrix | None) -> VertexRows:
         rows = VertexRows(self._pattern, data, more)
@@ -191,23 +209,6 @@ class Hessian:
     matrix: Callable[[np.ndarray, sp.spmatrix | None], Matrix]
     rest: sp.spmatrix | None
     scale: float
-
-
-def _numbered_pairs(cells: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns (p,) and rows (p,) of the pairs of corners of cells (c,k), each once, column by column; and the number of
-    every pair of every cell, cell by cell and row by row of their blocks."""
-    several = [c.astype(np.int32, copy=False) for c in cells]
-    column = np.concatenate([np.tile(c, (1, c.shape[1])).ravel() for c in several])
-    row = np.concatenate([np.repeat(c, c.shape[1], axis=1).ravel() for c in several])
-    # By rows first, the columns then keep their order.
-    order = order_of_numbers(row)
-    order = order[order_of_numbers(column[order])].astype(np.int32)
-    column, row = column[order], row[order]
-    begins = np.ones(len(order), bool)
-    begins[1:] = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
-    number = np.empty(len(order), np.int32)
-    number[order] = np.cumsum(begins, dtype=np.int32) - 1
-    return column[begins], row[begins], number
 
 
 @overload
@@ -275,10 +276,10 @@ def hessian_blocks(
 
     weight : of the area term, one or (p,) of the polygons; pressure : see `energy.face_derivatives`
     """
-    count = len(faces.area)
+    count, turned = len(faces.area), _turned_vertices(axes, symmetry)
     gradient, scale, rest = np.zeros(len(w), complex), 0.0, None
     if len(faces.triangles) <= 2 * AT_ONCE:
-        found = _blocks_at_once(faces, w, weight, pressure, axes, symmetry, gradient)
+        found = _blocks_at_once(faces, w, weight, pressure, (*axes, turned), symmetry, gradient)
         return found if symmetry is None else replace(found, gradient=symmetry.folded(gradient))
     first = lone_triangles(faces)
     four = (len(faces.triangles) - first) // 4
@@ -288,7 +289,7 @@ def hessian_blocks(
         some = np.zeros(count, bool)
         some[begin : begin + AT_ONCE] = True
         of, kept = (x if np.ndim(x) == 0 else x[some] for x in (weight, pressure))
-        found = _blocks_at_once(restricted(faces, some, place), w, of, kept, axes, symmetry, gradient)
+        found = _blocks_at_once(restricted(faces, some, place), w, of, kept, (*axes, turned), symmetry, gradient)
         here = some if faces.polygon is None else some[faces.polygon]
         triangles[here[:first]] = found.triangles
         if found.quads is not None:
@@ -303,13 +304,13 @@ def _blocks_at_once(
     faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None, gradient: np.ndarray
 ) -> Blocks:
     """As `hessian_blocks`, of all faces at once, which add their gradient to that of all vertices (n,) complex."""
-    n, first, (frame, free) = len(w), lone_triangles(faces), axes
+    n, first, (frame, free, _) = len(w), lone_triangles(faces), axes
     eagerness = EAGERNESS * (1 - pressure)
     a, b = faces.derivatives(w)
     slopes, kept, radial = by_squares(faces, a, b, weight, pressure, eagerness)
     _add_at_vertices(gradient, faces, corner_slopes(faces, a, b, slopes))
     blocks = triangle_blocks(faces.gradient, a, b, kept, radial)
-    vertex = _in_axes(blocks, faces.triangles, frame, free, symmetry)
+    vertex = _in_axes(blocks, faces.triangles, axes, symmetry)
     scale = float(np.einsum("iim->", blocks)) / (2 * n)
     if faces.polygon is None:
         return Blocks(gradient, blocks.transpose(2, 0, 1), None, None, scale)
@@ -387,17 +388,24 @@ def _fill_blocks(blocks: np.ndarray, gradient, a, b, kept, radial) -> None:
                 blocks[2 * j + q, 2 * i + p] = entry
 
 
-def _in_axes(blocks: np.ndarray, triangles: np.ndarray, frame, free, symmetry: MirrorSymmetry | None) -> np.ndarray:
-    """Bring blocks (6,6,m) of triangles (m,3), in place, into the axes of their vertices, or of those these follow;
-    these vertices (m,3)."""
-    found = triangles if symmetry is None else symmetry.representative[triangles]
+def _turned_vertices(axes: tuple[np.ndarray, np.ndarray], symmetry: MirrorSymmetry | None) -> np.ndarray | None:
+    """Which vertices (n,) bool have other axes than those of the plane, or follow another; None where none does."""
+    frame, free = axes
     plain = (frame == 1) & free.all(axis=1)
     if symmetry is not None:
         plain = plain[symmetry.representative] & ~symmetry.flip & (symmetry.factor == 1)
-    if plain.all():
+    return None if plain.all() else ~plain
+
+
+def _in_axes(blocks: np.ndarray, triangles: np.ndarray, axes, symmetry: MirrorSymmetry | None) -> np.ndarray:
+    """Bring blocks (6,6,m) of triangles (m,3), in place, into the axes of their vertices, or of those these follow;
+    these vertices (m,3)."""
+    frame, free, others = axes
+    found = triangles if symmetry is None else symmetry.representative[triangles]
+    if others is None:
         return found
     for k, vertices in enumerate(triangles.T):
-        turned = np.flatnonzero(~plain[vertices])
+        turned = np.flatnonzero(others[vertices])
         # Rows of linear forms that say 1 and i, as forms of the steps along the axes.
         corner, forms = vertices[turned, None], np.tile(np.array([[1], [-1j]]), (len(turned), 1, 1))
         if symmetry is not None:

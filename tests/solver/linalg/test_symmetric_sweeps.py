@@ -91,7 +91,7 @@ def test_what_is_added_may_join_vertices_of_a_colour():
         (3 * rng.normal(size=80), (np.repeat(np.arange(8), 10), (2 * np.array(joined)[:, :, None] + [0, 1]).ravel())),
         shape=(8, 2 * n),
     )
-    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks()(F), local)]), forms.T @ forms)
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.places()(F), local)]), forms.T @ forms)
     rows.add_diagonal(np.full(2 * n, 0.01))
     b = rng.normal(size=2 * n)
     x = solver.solve(rows, b, V[:, 0] + 1j * V[:, 1], lambda: np.tile([1, 1j], (n, 1)))
@@ -107,7 +107,7 @@ def test_a_sweep_there_parts_and_a_sweep_back_are_those_vertex_by_vertex(joined)
     local = rng.normal(size=(len(F), 6, 6))
     more = sp.random(2 * n, 6, 0.1, "csr", random_state=2) if joined else None
     more = more @ more.T if joined else None
-    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks()(F), local @ local.swapaxes(1, 2))]), more)
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.places()(F), local @ local.swapaxes(1, 2))]), more)
     rows.add_diagonal(np.full(2 * n, 0.1))
     unknowns = (2 * pattern.order[:, None] + [0, 1]).ravel()
     matrix = rows.plain().toarray()[np.ix_(unknowns, unknowns)]

@@ -19,18 +19,24 @@ def quads(seed: int):
     return V, P[5:].astype(np.int32), np.concatenate([P[:5, :3], P[:5, [0, 2, 3]]]).astype(np.int32)
 
 
+def blocks_of(places: vertex_rows.BlockPlaces) -> np.ndarray:
+    """Block (c,p) of every pair of corners of cells; ~ that where the second corner comes first."""
+    found = places.touched[places.number]
+    return np.where(places.turned, ~found, found).T
+
+
 @pytest.mark.parametrize("at_once", [1, 7, 60])
 def test_patterns_do_not_depend_on_how_many_are_looked_at_once(at_once, monkeypatch):
     V, four, three = quads(0)
     whole = RowPattern([three, four], len(V))
-    expected = [whole.blocks()(cells) for cells in (three, four)]
+    expected = [blocks_of(whole.places()(cells)) for cells in (three, four)]
     monkeypatch.setattr(vertex_rows, "AT_ONCE", at_once)
     found = RowPattern([three, four], len(V))
     for name in ("order", "first", "start", "columns"):
         np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
-    of_cells = found.blocks()
+    of_cells = found.places()
     for cells, blocks in zip((three, four), expected, strict=True):
-        parts = [of_cells(cells[k : k + at_once]) for k in range(0, len(cells), at_once)]
+        parts = [blocks_of(of_cells(cells[k : k + at_once])) for k in range(0, len(cells), at_once)]
         np.testing.assert_array_equal(np.concatenate(parts), blocks)
 
 
@@ -43,9 +49,11 @@ def test_blocks_are_those_of_both_corners_of_a_pair():
     ends = pattern.first[1:][np.searchsorted(pattern.first[1:], row, side="right")]
     column = pattern.columns[::2] // 2 + ends
     assert (pattern.columns[1::2] == pattern.columns[::2] + 1).all() and pattern.count == len(row)
-    of_cells = pattern.blocks()
+    of_cells = pattern.places()
     for cells in (three, four):
-        for cell, blocks in zip(cells, of_cells(cells), strict=True):
+        places = of_cells(cells)
+        assert (np.diff(places.touched) > 0).all() and places.alike is None
+        for cell, blocks in zip(cells, blocks_of(places), strict=True):
             for one, other, block in zip(*(place[cell[side]] for side in corner_pairs(len(cell))), blocks, strict=True):
                 if one == other:
                     assert block == pattern.count + one
@@ -146,7 +154,7 @@ def test_motions_of_parts_precondition_in_either_precision(single, monkeypatch):
     n, rng = len(V), np.random.default_rng(6)
     pattern = RowPattern([F, np.zeros((0, 4), np.int64)], n)
     local = np.stack([np.kron([[1, -0.5, -0.5], [-0.5, 1, -0.5], [-0.5, -0.5, 1]], np.eye(2))] * len(F))
-    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.blocks()(F), local)]))
+    rows = VertexRows(pattern, VertexRows.summed(pattern, [(pattern.places()(F), local)]))
     rows.add_diagonal(np.full(2 * n, 0.01))
     b, solver = rng.normal(size=2 * n), symmetric_sweeps.SymmetricSweeps(V, F)
     monkeypatch.setattr(symmetric_sweeps, "SINGLE_FROM", 0 if single else 10**6)
