@@ -426,8 +426,9 @@ def _lies_flat(
     return (
         gap <= GAP * extent
         and area >= filled * float(np.prod(_boxes(flat), axis=0).min())
-        and covered_share(flat, corners, SAMPLES) <= COVERED
+        # What is beside the rest takes a third of the time, and finds most of what lies on it.
         and part_covered(flat, corners, np.flatnonzero(part[rows])) <= COVERED_PART
+        and covered_share(flat, corners, SAMPLES) <= COVERED
     )
 
 
