@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..mesh.geometry import as_points, cross2, signed_areas
@@ -25,19 +27,36 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     points. 0 where no triangle has an area, and where a few triangles have less in common, pair by pair, than one
     point stands for. Time and memory stay bounded on maps that are mere noise.
     """
-    uv = np.asarray(uv, float)
-    area = np.abs(cross2(uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0])) / 2
-    tri, area = uv[area > 0], area[area > 0]
-    if not len(tri):
-        return 0.0
-    grid = _Grid(tri)
-    if PAIR_WORK * grid.pair_count() < samples and 2 * grid.common_area() * samples < area.sum():
-        return 0.0
-    points = _draw(tri, area, samples, seed)
-    pairs = np.cumsum(grid.candidates(points))
-    points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
-    covered = [grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)])]
-    return float((np.concatenate(covered) > 1).mean())
+    return _Areas(np.asarray(uv, float)).share(samples, seed)
+
+
+def covers_itself(uv: np.ndarray, bounds: Sequence[tuple[int, float]]) -> bool:
+    """Whether `overlap_share` of triangles `uv` (m,3,2) is above the share of any of some bounds, each with the number
+    of its samples: few first, which find what there is much of."""
+    areas = _Areas(np.asarray(uv, float))
+    return any(areas.share(samples) > share for samples, share in bounds)
+
+
+class _Areas:
+    """Those of triangles `uv` (m,3,2) that have an area, with their grid."""
+
+    def __init__(self, uv: np.ndarray):
+        area = np.abs(cross2(uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0])) / 2
+        self.triangles, self.area = uv[area > 0], area[area > 0]
+        self.grid = _Grid(self.triangles) if len(self.area) else None
+
+    def share(self, samples: int, seed: int = 0) -> float:
+        """Their `overlap_share`."""
+        if self.grid is None:
+            return 0.0
+        few = PAIR_WORK * self.grid.pair_count() < samples
+        if few and 2 * self.grid.common_area() * samples < self.area.sum():
+            return 0.0
+        points = _draw(self.triangles, self.area, samples, seed)
+        pairs = np.cumsum(self.grid.candidates(points))
+        points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
+        covered = [self.grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)])]
+        return float((np.concatenate(covered) > 1).mean())
 
 
 def covered_share(w: np.ndarray, triangles: np.ndarray, samples: int = SAMPLES) -> float:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.maps import overlap
-from omt_uv.solver.maps.overlap import overlap_share
+from omt_uv.solver.maps.overlap import covers_itself, overlap_share
 
 
 def square(n=8):
@@ -91,3 +91,13 @@ def test_a_coarser_grid_finds_the_same(monkeypatch):
     grid = overlap._Grid(uv)
     assert len(grid.owner) <= 8 * len(uv) and grid.side < overlap._Grid(uv[:1]).side * 20
     assert overlap_share(uv) == found > 0.1
+
+
+@pytest.mark.parametrize("shift", [0.2, 0.9, 0.999, 1.0, 3.0])
+def test_a_map_covers_itself_where_it_is_above_any_bound(shift):
+    square = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
+    uv = np.concatenate([square, square + [shift, 0]])
+    for bounds in ([(100, 0.5), (4000, 0.01)], [(4000, 0.0)], [(100, 1.0), (100, 0.9)], []):
+        above = any(overlap_share(uv, samples=samples) > share for samples, share in bounds)
+        assert covers_itself(uv, bounds) == above
+    assert covers_itself(uv, [(4000, 0.0)]) == (shift < 0.9995)
