@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import scenes
+from operator_runs import other_values
 
 # Settings of Unwrap alone, which others take as they are.
 UNWRAP = {"seams", "fill_holes", "cut_further", "kind", "aspect", "pack_around"}
@@ -31,19 +32,6 @@ OPERATORS = {
 }
 
 
-def others(prop):
-    """Values of a property that are not its default."""
-    if prop.type == "BOOLEAN":
-        return [not prop.default]
-    if prop.type == "ENUM":
-        return [item.identifier for item in prop.enum_items if item.identifier != prop.default]
-    if prop.type == "STRING":
-        return ["some"]
-    top = min(prop.hard_max, prop.default + 3)
-    value = prop.default + (top - prop.default) / 2 if top > prop.default else (prop.default + prop.hard_min) / 2
-    return [int(value) if prop.type == "INT" else value]
-
-
 @pytest.mark.parametrize("name", OPERATORS)
 def test_every_property_reaches_its_setting_and_no_other(name):
     given, renamed, without, besides = OPERATORS[name]
@@ -52,7 +40,7 @@ def test_every_property_reaches_its_setting_and_no_other(name):
     for prop in scenes.stand_in(name).rna_type.properties:
         if prop.is_readonly or prop.identifier == "rna_type" or getattr(prop, "is_array", False):
             continue
-        for value in others(prop):
+        for value in other_values(prop):
             found = vars(scenes.stand_in(name, **{prop.identifier: value}).settings(*given))
             changed = {key: v for key, v in found.items() if v != base[key]}
             field = renamed.get(prop.identifier, prop.identifier)

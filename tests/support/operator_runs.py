@@ -103,3 +103,16 @@ def lines_told(capfd, name, **arguments):
 def numbers(text):
     """The numbers in a text."""
     return [float(x) for x in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text)]
+
+
+def other_values(prop):
+    """Values of a property that are not its default."""
+    if prop.type == "BOOLEAN":
+        return [not prop.default]
+    if prop.type == "ENUM":
+        return [item.identifier for item in prop.enum_items if item.identifier != prop.default]
+    if prop.type == "STRING":
+        return ["some"]
+    top = min(prop.hard_max, prop.default + 3)
+    value = prop.default + (top - prop.default) / 2 if top > prop.default else (prop.default + prop.hard_min) / 2
+    return [int(value) if prop.type == "INT" else value]

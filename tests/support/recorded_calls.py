@@ -8,16 +8,27 @@ import functools
 import importlib
 import inspect
 import pkgutil
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
+import omt_uv
 from omt_uv import solver
 
 LARGEST = 400_000
+SAMPLED = 20_000
+# What Blender calls by itself, and counts the arguments of.
+CALLED_BY_BLENDER = {"cancel", "check", "description", "draw", "execute", "invoke", "modal", "poll", "draw_header",
+                     "draw_header_preset"}  # fmt: skip
+# Numbers in texts, and paths, which differ from machine to machine.
+NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+PATH = re.compile(r"\S*/\S*")
 
 
 class Call(NamedTuple):
@@ -55,6 +66,48 @@ def leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
                 yield from leaves(getattr(value, field.name), depth + 1)
 
 
+def told_leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
+    """Leaves as above of what is told as well: the letters of texts without paths, and the numbers in them."""
+    if isinstance(value, Enum):
+        value = value.value
+    if value is None or isinstance(value, Path):
+        yield np.asarray(-1.0)
+    elif isinstance(value, str):
+        text = PATH.sub("/", value)
+        yield np.frombuffer(NUMBER.sub("#", text).encode(), np.uint8).astype(float)
+        yield np.array([float(word) for word in NUMBER.findall(text)])
+    elif isinstance(value, (bytes, bytearray)):
+        yield np.frombuffer(value, np.uint8).astype(float)
+    elif isinstance(value, (tuple, list, set, frozenset)) and depth < 6:
+        yield np.asarray(len(value))
+        for item in sorted(value, key=repr) if isinstance(value, (set, frozenset)) else value:
+            yield from told_leaves(item, depth + 1)
+    elif isinstance(value, dict) and depth < 6:
+        for key, item in value.items():
+            if key != "seconds":
+                yield from told_leaves([key, item], depth + 1)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type) and depth < 6:
+        for field in dataclasses.fields(value):
+            if not field.name.startswith("_") and field.name != "seconds":
+                yield from told_leaves(getattr(value, field.name), depth + 1)
+    else:
+        yield from leaves(value, depth)
+
+
+def figures(found) -> np.ndarray:
+    """Two figures of arrays: of their sizes, and of where in them what lies."""
+    size = place = 0.0
+    for k, leaf in enumerate(found):
+        x = np.nan_to_num(np.asarray(leaf).astype(complex).ravel(), nan=7.0, posinf=9.0, neginf=-9.0)
+        x = np.concatenate([x.real, x.imag]) if leaf.dtype.kind == "c" else x.real
+        total = np.abs(x).sum()
+        weight = np.cos(0.3 + 1.7 * np.arange(len(x)) + 0.61 * k)
+        own = 1 + 0.5 * np.sin(k)
+        size += own * (np.log(total) if total > 1e-12 else 0.0) + 0.01 * len(x)
+        place += own * (weight @ x) / total if total > 1e-12 else 0.0
+    return np.array([size, place])
+
+
 def same(a, b) -> bool:
     """Whether two values hold the same numbers, bit for bit."""
     left, right = list(leaves(a)), list(leaves(b))
@@ -70,9 +123,19 @@ def modules() -> list:
     return [importlib.import_module(name) for name in sorted(names)]
 
 
+def front_modules() -> list:
+    """All modules of the package but those of the solver, imported."""
+    names = [m.name for m in pkgutil.walk_packages(omt_uv.__path__, omt_uv.__name__ + ".")]
+    return [
+        importlib.import_module(name)
+        for name in sorted(names)
+        if not f"{name}.".startswith(f"{solver.__name__}.") and not name.endswith("__main__")
+    ]
+
+
 def _public(module) -> Iterator[tuple[str, Any, str, Callable]]:
     """Names, owners, attributes and functions of a module: public functions, and public methods of its classes."""
-    short = module.__name__.removeprefix(solver.__name__ + ".")
+    short = module.__name__.removeprefix(solver.__name__ + ".").removeprefix(omt_uv.__name__ + ".")
     for name, value in sorted(vars(module).items()):
         if getattr(value, "__module__", "") != module.__name__ or name.startswith("_"):
             continue
@@ -80,18 +143,20 @@ def _public(module) -> Iterator[tuple[str, Any, str, Callable]]:
             yield f"{short}.{name}", None, name, value
         elif inspect.isclass(value):
             for method, found in sorted(vars(value).items()):
+                if method in CALLED_BY_BLENDER:
+                    continue
                 if inspect.isfunction(found) and (not method.startswith("_") or method == "__call__"):
                     yield f"{short}.{name}.{method}", value, method, found
 
 
 class Record:
-    """The first call of every function in each run, what came of it, and in which calls arguments were changed."""
+    """The first call of every function in each run, in which calls arguments were changed, and figures of all."""
 
     def __init__(self, most: int) -> None:
         self.most = most
         self.calls: dict[str, list[Call]] = {}
-        self.found: dict[str, list[list[np.ndarray]]] = {}
         self.changed: dict[str, Callable] = {}
+        self.told: dict[str, np.ndarray] = {}
         self._in_this_run: set[str] = set()
 
     def next_run(self) -> None:
@@ -113,15 +178,68 @@ class Record:
         return call
 
     def end(self, call: Call | None, args: tuple, kwargs: dict, result, is_method: bool) -> None:
-        """Keep what came of a call; a method may change what it belongs to, and nothing else."""
-        if call is None:
-            return
-        is_changed = not same((call.args[is_method:], call.kwargs), (args[is_method:], kwargs))
-        if is_changed:
+        """Keep whether a call changed its arguments; a method may change what it belongs to, and nothing else."""
+        if call is not None and not same((call.args[is_method:], call.kwargs), (args[is_method:], kwargs)):
             self.changed[call.name] = call.function
-        if not inspect.isgenerator(result):
-            told = [result, args] if is_changed or result is None else [result]
-            self.found.setdefault(call.name, []).append([np.array(leaf) for leaf in leaves(told)])
+
+
+class Told(Record):
+    """Figures of what comes of the first calls of every function in each run, and how many there are."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__(most)
+        self.figures: dict[str, np.ndarray] = {}
+        self._calls: dict[str, int] = {}
+        self._mark = ""
+
+    def next_run(self, mark: str = "") -> None:
+        """From here on calls are counted anew, and figures are those of a function with this mark behind its name."""
+        self._calls, self._mark = {}, mark
+
+    def begin(self, name: str, function: Callable, args: tuple, kwargs: dict) -> Call | None:
+        """A call that begins; None if it is not counted."""
+        k = self._calls[name] = self._calls.get(name, 0) + 1
+        return Call(name, function, (k,), {}) if k <= self.most else None
+
+    def end(self, call: Call | None, args: tuple, kwargs: dict, result, is_method: bool) -> None:
+        """Add the figures of what came of a call."""
+        if call is not None and not inspect.isgenerator(result):
+            self.add(call.name + self._mark, [result, args] if result is None else result, call.args[0])
+
+    def add(self, name: str, value, k: int = 1) -> None:
+        """Add the figures of a value to those of a name."""
+        # Of pictures and the like some numbers stand for all.
+        found = [leaf.ravel()[:: 1 + leaf.size // SAMPLED] for leaf in told_leaves(value)]
+        own = np.array([1.0, *figures(found)]) * (1 + 0.1 * (k - 1))
+        self.figures[name] = self.figures.get(name, np.zeros(3)) + own
+
+
+# How exact figures are told to be, at best and at worst.
+EXACT = 1e-6
+LOOSE = 1e-2
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """How far two triples of figures are apart, relative to what is larger than one."""
+    return float((np.abs(one - other) / np.maximum(1, np.abs(other))).max())
+
+
+def lines_of(rows: dict[str, np.ndarray], others: list[dict[str, np.ndarray]]) -> Iterator[str]:
+    """Lines of a table of figures, each with how exact it is: ten times as much as others, of nearly the same input,
+    are off; without those that the last bits of the input decide."""
+    for name, row in sorted(rows.items()):
+        off = max((apart(other[name], row) if name in other else np.inf for other in others), default=0.0)
+        exact = max(EXACT, 10.0 ** np.ceil(np.log10(max(10 * off, 1e-12))))
+        if exact <= LOOSE:
+            yield "\t".join([name, f"{exact:.0e}", *(f"{x:.7g}" if x % 1 else f"{x:.0f}" for x in row)])
+
+
+def unlike(lines: list[str], rows: dict[str, np.ndarray]) -> Iterator[str]:
+    """Those lines of a table of figures that are not those of rows."""
+    for line in lines:
+        name, exact, *values = line.split("\t")
+        if name not in rows or apart(rows[name], np.array(values, float)) > float(exact) + EXACT:
+            yield line
 
 
 def _watched(record: Record, name: str, function: Callable, is_method: bool) -> Callable:
@@ -146,9 +264,9 @@ def _watched(record: Record, name: str, function: Callable, is_method: bool) -> 
     return plain
 
 
-def forget() -> None:
-    """Empty the caches of the solver: what other tests have called is called again."""
-    for module in modules():
+def forget(everything: list) -> None:
+    """Empty the caches of modules: what other tests have called is called again."""
+    for module in everything:
         for value in vars(module).values():
             if hasattr(value, "cache_clear"):
                 value.cache_clear()
@@ -157,9 +275,16 @@ def forget() -> None:
 @contextmanager
 def recorded(most: int = 1) -> Iterator[Record]:
     """A context in which the first calls of every public function and method of the solver are kept."""
-    record, everything, before = Record(most), modules(), []
-    watched = {}
-    forget()
+    record = Record(most)
+    with watching(record, [*modules(), solver]):
+        yield record
+
+
+@contextmanager
+def watching(record: Record, everything: list) -> Iterator[None]:
+    """A context in which a record hears of all calls of public functions and methods of modules."""
+    before, watched = [], {}
+    forget(everything)
     for module in everything:
         for name, owner, attribute, function in _public(module):
             if owner is None:
@@ -167,13 +292,13 @@ def recorded(most: int = 1) -> Iterator[Record]:
             else:
                 before.append((owner, attribute, function))
                 setattr(owner, attribute, _watched(record, name, function, True))
-    for module in [*everything, solver]:
+    for module in everything:
         for attribute, value in list(vars(module).items()):
             if inspect.isfunction(value) and value in watched:
                 before.append((module, attribute, value))
                 setattr(module, attribute, watched[value])
     try:
-        yield record
+        yield
     finally:
         for owner, attribute, value in before:
             setattr(owner, attribute, value)

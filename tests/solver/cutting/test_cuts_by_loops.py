@@ -287,6 +287,26 @@ def test_holes_are_all_loops_but_the_longest_and_fans_close_them():
     assert hole_filling.fill_holes(surface, gluing, ~none).holes == 0
 
 
+def test_edges_of_what_fills_a_hole_cost_so_many_times_as_much_and_others_the_same(monkeypatch):
+    V, F = two_holes()
+    filled = hole_filling.fill_holes(triangle_surface(V, F), gluing_of(V, F), np.zeros(len(F), bool))
+    gluing, place = filled.gluing, filled.surface.positions
+    everything = np.arange(len(gluing.triangles)), np.arange(len(gluing.first))
+    given = (gluing, place, gluing.vertex, *everything, np.zeros(len(place)), np.ones(len(gluing.first)))
+    found = []
+    for cost in (1.0, components.HOLE):
+        monkeypatch.setattr(components, "HOLE", cost)
+        found.append(components.make_component(*given))
+    one, other = found
+    # Ends of fans are the new vertices; every other edge is between two that were there.
+    new = (np.linalg.norm(one.positions[:, None] - place[None, len(V) :], axis=2) < 1e-9).any(axis=1)
+    fans = new[one.ends].any(axis=1)
+    assert fans.sum() == 10 and (other.cost[fans] / one.cost[fans]).tolist() == pytest.approx([components.HOLE] * 10)
+    # Those on the boundary of a hole are of what fills it, too.
+    times = np.isclose(other.cost, components.HOLE * one.cost)
+    assert ((other.cost == one.cost) ^ times).all() and times.sum() == 20 and (~times).sum() > 20
+
+
 @pytest.mark.parametrize("sieve, filled", [(0, 2), (1, 2), (2, 0)])
 def test_sieves_have_more_holes_than_are_allowed(sieve, filled):
     V, F = two_holes()

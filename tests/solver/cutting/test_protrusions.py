@@ -8,7 +8,7 @@ import pytest
 from short_cuts import component_of
 
 from omt_uv.solver.cutting.cut_graph import cut_classes, path_to
-from omt_uv.solver.cutting.protrusions import disk_spread, log_scale, outline_spread, spread
+from omt_uv.solver.cutting.protrusions import disk_spread, first_tips, log_scale, outline_spread, spread
 from omt_uv.solver.mesh.geometry import (
     LEAST_STIFFNESS,
     angle_defects,
@@ -99,3 +99,14 @@ def test_a_hemisphere_spreads_a_disk_as_its_stereographic_projection_does():
     component = component_of(np.vstack([[0, 0, 1], V]), np.concatenate([top, one, other]))
     mean, square = 2 * np.log(2) - 1, 2 * np.log(2) ** 2 - 4 * np.log(2) + 2
     assert disk_spread(component, uncut(component)) == pytest.approx(square - mean**2, rel=0.01)
+
+
+@pytest.mark.parametrize("count, sides", [(0, True), (1, False), (2, False)])
+def test_a_first_cut_has_a_third_tip_where_two_are_joined_by_an_edge(count, sides):
+    V, F = meshes.icosphere(count) if count else (np.array([[0, 0, 0], [1, 0, 0], [0, 1.2, 0], [0, 0, 3.0]]),
+                                                  np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))  # fmt: skip
+    component = component_of(V * [1.0, 1.3, 0.8], F)
+    tips = first_tips(component)
+    edges = {frozenset(edge) for edge in component.ends.tolist()}
+    assert (frozenset(tips[:2].tolist()) in edges) == sides == (len(tips) == 3)
+    assert len(set(tips.tolist())) == len(tips)
