@@ -147,8 +147,9 @@ def is_marked(surface: Surface, chart: Chart) -> bool:
 
 
 def identity(chart: Chart) -> tuple[bytes, bytes]:
-    """Equal for charts of the same corners that are joined in the same way."""
-    return chart.corners.tobytes(), chart.disk.tobytes()
+    """Equal for charts of the same corners that are joined in the same way, whatever the order of their vertices."""
+    _, first, number = np.unique(chart.disk, return_index=True, return_inverse=True)
+    return chart.corners.tobytes(), first[number.ravel()].tobytes()
 
 
 def edge_set(edges: np.ndarray) -> bytes:

@@ -401,7 +401,20 @@ def mapped_anew(
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
 ) -> Steps[list[ChartMap]]:
     """Maps of the charts; those that are as known ones were have the maps of these."""
-    maps = {identity(chart): chart_map for chart, chart_map in known}
-    new = yield from map_charts([chart for chart in charts if identity(chart) not in maps])
+    maps = {identity(chart): (chart, chart_map) for chart, chart_map in known}
+    names = [identity(chart) for chart in charts]
+    new = yield from map_charts([chart for chart, name in zip(charts, names, strict=True) if name not in maps])
     rest = iter(new)
-    return [maps[identity(chart)] if identity(chart) in maps else next(rest) for chart in charts]
+    return [
+        _numbered_as(chart, *maps[name]) if name in maps else next(rest)
+        for chart, name in zip(charts, names, strict=True)
+    ]
+
+
+def _numbered_as(chart: Chart, other: Chart, chart_map: ChartMap) -> ChartMap:
+    """The map of another chart for one that is the same, but for the order of its vertices."""
+    if np.array_equal(chart.disk, other.disk):
+        return chart_map
+    uv = np.zeros_like(chart_map.uv)
+    uv[chart.disk] = chart_map.uv[other.disk]
+    return replace(chart_map, uv=uv)
