@@ -25,7 +25,7 @@ from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import boundary_loops, distinct, graph_components, on_boundary, pair_keys
 from ..progress import Steps
 from ..refinement.initial_maps import is_curved, unroll
-from .chart_indices import ChartPins, identity
+from .chart_indices import ChartPins, identity, in_order_of_corners
 from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
 from .convex_maps import with_figures
 from .options import MapOptions
@@ -412,9 +412,10 @@ def mapped_anew(
 
 
 def _numbered_as(chart: Chart, other: Chart, chart_map: ChartMap) -> ChartMap:
-    """The map of another chart for one that is the same, but for the order of its vertices."""
-    if np.array_equal(chart.disk, other.disk):
+    """The map of another chart for one that is the same, but for the order of its vertices and triangles."""
+    here, there = in_order_of_corners(chart)[1], in_order_of_corners(other)[1]
+    if np.array_equal(here, there):
         return chart_map
     uv = np.zeros_like(chart_map.uv)
-    uv[chart.disk] = chart_map.uv[other.disk]
+    uv[here] = chart_map.uv[there]
     return replace(chart_map, uv=uv)

@@ -959,12 +959,13 @@ def test_charts_that_are_as_before_keep_their_maps():
     assert asked == [new]
 
 
-def test_charts_that_are_as_before_but_for_the_order_of_their_vertices_keep_their_maps():
+def test_charts_that_are_as_before_but_for_the_order_of_their_vertices_and_triangles_keep_their_maps():
     V, F = meshes.grid(2, 2)
-    order = np.random.default_rng(0).permutation(len(V))
-    place = np.argsort(order)
-    known = chart_of(V, F)
-    new = replace(chart_of(V[order], place[F]), corners=known.corners)
+    rng = np.random.default_rng(0)
+    order, rows = rng.permutation(len(V)), rng.permutation(len(F))
+    place, known = np.argsort(order), chart_of(V, F)
+    turned = np.roll(np.stack([place[F], known.corners])[:, rows], 1, axis=2).astype(np.int32)
+    new = replace(known, vertices=V[order], triangles=turned[0], corners=turned[1], faces=known.faces[rows])
     chart_map = ChartMap(uv=V[:, :2] + 0.5, area_l1=0.0, area_sd=0.0, angle_mean=1.0, folds=0)
 
     def map_charts(charts):
