@@ -172,7 +172,8 @@ def test_what_has_no_symmetric_cut_is_cut_without_symmetry(mirror, monkeypatch):
         asked.append((mirror, len(trials), finer))
         return done([] if mirror else [SimpleNamespace(score=1.0)])
 
-    own = SimpleNamespace(options=SimpleNamespace(trials=4, vertices=10), _several_grown=several)
+    own = SimpleNamespace(options=SimpleNamespace(vertices=10), _several_grown=several)
+    own._trials = lambda component, finer: 4
     own._grown_finer = lambda *given: search.SeamSearch._grown_finer(own, *given)
     component = SimpleNamespace(positions=np.zeros((3, 3)), ends=np.array([[0, 1]]))
     found = Found(mirror, np.array([0]), SimpleNamespace(positions=np.zeros((20, 3))))

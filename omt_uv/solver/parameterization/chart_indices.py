@@ -147,8 +147,21 @@ def is_marked(surface: Surface, chart: Chart) -> bool:
 
 
 def identity(chart: Chart) -> tuple[bytes, bytes]:
-    """Equal for charts of the same corners that are joined in the same way."""
-    return chart.corners.tobytes(), chart.disk.tobytes()
+    """Equal for charts of the same corners that are joined in the same way, whatever the order of their vertices and
+    triangles, but for those with patches."""
+    corners, triangles = in_order_of_corners(chart)
+    if len(chart.patches):
+        return corners.tobytes(), np.concatenate([triangles, chart.patches]).astype(np.int64).tobytes()
+    _, first, number = np.unique(triangles, return_index=True, return_inverse=True)
+    return corners.tobytes(), first[number.ravel()].tobytes()
+
+
+def in_order_of_corners(chart: Chart) -> tuple[np.ndarray, np.ndarray]:
+    """The corners of the surface (m,3) and the triangles (m,3) of a chart, in the order of the former alone."""
+    corners, turn = lowest_first(chart.corners)
+    order = np.lexsort(corners.T[::-1])
+    triangles = np.take_along_axis(chart.triangles, turn, axis=1)
+    return corners[order].astype(np.int64), triangles[order].astype(np.int64)
 
 
 def edge_set(edges: np.ndarray) -> bytes:

@@ -38,6 +38,7 @@ from .initial_map import (
     flat_initial_map,
     good_enough,
     mean_value_sites,
+    roomier_initial_map,
     roomy_initial_map,
 )
 from .options import MapOptions
@@ -362,7 +363,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal:
                 return found
         except MeshError as error:
             log.warnings.append(f"{error.cause}; refined without a coarser mesh")
-    return (yield from direct_initial_map(disk, log))
+    return (yield from (direct_initial_map(disk, log) if draft else roomier_initial_map(disk, balance, log)))
 
 
 def _refined(

@@ -92,6 +92,10 @@ SMOOTH_WEIGHT_FAR = 500.0
 ROOM = SMOOTH_WEIGHT * UNSQUEEZED
 # The most shear energy, over the spread of the flat map, that it may have: of more some stays.
 MOST_SHEAR = 3.0
+# Free disks of a middle size whose start has more energy than that have limbs squeezed to next to nothing. From a
+# coarser mesh the way is half as long, and ends with less shear; up to so many vertices there is none.
+NO_ROOM = 10 * SQUEEZED
+TOO_COARSE = 1000
 
 
 @dataclass(frozen=True)
@@ -315,6 +319,21 @@ def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
     """Map a disk by itself: flattened or, if large, embedded where it may be, else by conformal map and transport."""
     found = flat_initial_map(disk, log) if disk.boundary == "free" else evened_initial_map(disk, log, large=True)
     return (yield from initial_map(disk, log)) if found is None else found
+
+
+def roomier_initial_map(disk: DiskMesh, balance: float, log: RunLog) -> Steps[InitialChartMap]:
+    """The same, but for a free disk of a middle size that has next to no room there: by way of a coarser mesh, if there
+    is one."""
+    found = yield from direct_initial_map(disk, log)
+    middling = TOO_COARSE < len(disk.vertices) <= COARSE_ABOVE
+    if disk.boundary != "free" or disk.is_far or not middling:
+        return found
+    if _energy(elements(disk.vertices, disk.triangles, disk.target), found.uv, SMOOTH_WEIGHT) <= NO_ROOM:
+        return found
+    with suppress(MeshError):
+        coarser = yield from coarse_initial_map(disk, balance, log)
+        return found if coarser is None else coarser
+    return found
 
 
 def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool, goal: float) -> Refinement | None:

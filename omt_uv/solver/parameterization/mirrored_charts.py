@@ -25,7 +25,7 @@ from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import boundary_loops, distinct, graph_components, on_boundary, pair_keys
 from ..progress import Steps
 from ..refinement.initial_maps import is_curved, unroll
-from .chart_indices import ChartPins, identity
+from .chart_indices import ChartPins, identity, in_order_of_corners
 from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
 from .convex_maps import with_figures
 from .options import MapOptions
@@ -401,7 +401,21 @@ def mapped_anew(
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
 ) -> Steps[list[ChartMap]]:
     """Maps of the charts; those that are as known ones were have the maps of these."""
-    maps = {identity(chart): chart_map for chart, chart_map in known}
-    new = yield from map_charts([chart for chart in charts if identity(chart) not in maps])
+    maps = {identity(chart): (chart, chart_map) for chart, chart_map in known}
+    names = [identity(chart) for chart in charts]
+    new = yield from map_charts([chart for chart, name in zip(charts, names, strict=True) if name not in maps])
     rest = iter(new)
-    return [maps[identity(chart)] if identity(chart) in maps else next(rest) for chart in charts]
+    return [
+        _numbered_as(chart, *maps[name]) if name in maps else next(rest)
+        for chart, name in zip(charts, names, strict=True)
+    ]
+
+
+def _numbered_as(chart: Chart, other: Chart, chart_map: ChartMap) -> ChartMap:
+    """The map of another chart for one that is the same, but for the order of its vertices and triangles."""
+    here, there = in_order_of_corners(chart)[1], in_order_of_corners(other)[1]
+    if np.array_equal(here, there):
+        return chart_map
+    uv = np.zeros_like(chart_map.uv)
+    uv[here] = chart_map.uv[there]
+    return replace(chart_map, uv=uv)

@@ -48,6 +48,8 @@ NEARLY = 0.03
 LITTLE = 0.1
 # A chart with less than this share of the square of log(shear) that the bound allows may do with a shorter cut.
 SLACK = 0.85
+# The square of log(shear) goes with this power of the share that is steep, or less: tails grow faster than means.
+SHEAR_BY_STEEP = 0.6
 # What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
 # What has no map is asked for this share of what cuts have left.
@@ -92,6 +94,7 @@ class ShearSearch:
             density=self._density,
             further=self.shear.further,
             memory=self.memory,
+            models=self.models,
             asked=float(np.log(self.shear.bound) ** 2),
             rehearse=self.rehearsed if self.shear.bound >= LEAST_REHEARSED else None,
             rehearsed=self.rehearsals,
@@ -174,6 +177,11 @@ class ShearSearch:
         return {}
 
     @cached_property
+    def models(self) -> dict:
+        """Of the coarse surface of what a search has found last."""
+        return {}
+
+    @cached_property
     def rehearsals(self) -> dict[bytes, float | None]:
         """What small surfaces were found to shear: later searches come to the same ones."""
         return {}
@@ -204,9 +212,10 @@ class ShearSearch:
 
 @dataclass(frozen=True)
 class Round:
-    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the same
-    but above the bound where too much is steep (k,), the numbers of those that miss it and may be cut for that, the
-    keys (s,) of edges that stay cut when these are cut anew, and those (s,) of slits into what was steep."""
+    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the share
+    (k,) that is steep, the mean but above the bound where too much is (k,), the numbers of those that miss it and may
+    be cut for that, the keys (s,) of edges that stay cut when these are cut anew, and those (s,) of slits into what was
+    steep."""
 
     charts: list[Chart]
     maps: list[ChartMap]
@@ -214,6 +223,7 @@ class Round:
     memory: dict
     area: np.ndarray
     mean: np.ndarray
+    steep: np.ndarray
     pressing: np.ndarray
     bound: float
     searched: list[int]
@@ -241,7 +251,7 @@ class Round:
         # What has no map at all is cut further without being asked: otherwise there would be nothing to look at.
         asked = [search.shear.further or one.failure is not None for one in maps]
         searched = [int(k) for k in missed if asked[k] or not is_marked(search.surface, charts[k])]
-        return Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched, settled, slits)
+        return Round(charts, maps, cuts, memory, area, mean, steep, pressing, bound, searched, settled, slits)
 
     def kept(self, chosen: list[int]) -> np.ndarray:
         """The edges (e,2) that stay cut when charts of these numbers are cut anew."""
@@ -303,8 +313,13 @@ class Round:
     @property
     def has_room(self) -> np.ndarray:
         """Charts (k,) bool that shear so much less than the bound that less of a cut may do."""
-        squares = np.log(self.pressing) ** 2
-        return (squares > 0) & (squares < SLACK * np.log(self.bound) ** 2)
+        return (self.pressing > 1) & (SLACK * self.room > 1)
+
+    @property
+    def room(self) -> np.ndarray:
+        """How many times the square of log(shear) of each chart (k,) may be, before it or what is steep is too much."""
+        of_mean = np.log(self.bound) ** 2 / np.maximum(np.log(self.pressing) ** 2, 1e-300)
+        return np.minimum(of_mean, (MOST_STEEP / np.maximum(self.steep, 1e-300)) ** SHEAR_BY_STEEP)
 
     def found_for(self, k: int) -> list[Found]:
         """What searches have found for chart k as a whole."""
@@ -366,8 +381,8 @@ class Round:
         return rounds == 1 and len(self.settled) > 0
 
     def share_allowed(self, k: int) -> float:
-        """How many times the square of log(shear) of chart k may be."""
-        return float(MARGIN * np.log(self.bound) ** 2 / np.log(self.pressing[k]) ** 2)
+        """How many times the square of log(shear) of chart k may be, less a margin."""
+        return float(MARGIN * self.room[k])
 
     def has_slack(self, k: int) -> bool:
         """Whether chart k, whose seams were searched, shears so much less than the bound that shorter ones may do."""

@@ -59,10 +59,9 @@ LEAST_SIDE = 0.05
 MOSTLY = 0.4
 # An outline is sharp with this share of it.
 MOSTLY_SHARP = 0.5
-# Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
+# Capacities are whole numbers: that of an edge of mean cost, and the greatest.
 MEAN_CAPACITY = 10_000
 MOST_CAPACITY = 10_000_000
-WHOLE = 2_000_000_000
 
 
 @dataclass(frozen=True)
@@ -420,15 +419,22 @@ def _enlarged(
 
 def minimum_cut(graph: PolygonGraph, capacity: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Which polygons (p,) bool are on the side of `one` (a,) of the cheapest cut between these and `other` (b,)."""
-    count = len(graph.area)
-    source, sink = count, count + 1
-    tail = np.concatenate([graph.joined[:, 0], graph.joined[:, 1], np.full(len(one), source), other])
-    head = np.concatenate([graph.joined[:, 1], graph.joined[:, 0], one, np.full(len(other), sink)])
-    room = np.concatenate([capacity, capacity, np.full(len(one) + len(other), WHOLE, np.int32)])
-    pipes = csr_matrix((room, (tail, head)), shape=(count + 2,) * 2, dtype=np.int32)
+    # What lies at either end is one: nothing is cut within, and it is most of the chart.
+    source, sink = 0, 1
+    inner = np.ones(len(graph.area), dtype=bool)
+    inner[one] = inner[other] = False
+    number = np.full(len(inner), sink)
+    number[one], number[inner] = source, np.arange(2, 2 + np.count_nonzero(inner))
+    tail, head = number[np.concatenate([graph.joined, graph.joined[:, ::-1]])].T
+    onwards = (tail != head) & (head != source) & (tail != sink)
+    # Between the ends everything is cut.
+    onwards &= (tail != source) | (head != sink)
+    count = 2 + int(np.count_nonzero(inner))
+    room = np.tile(capacity, 2)[onwards]
+    pipes = csr_matrix((room, (tail[onwards], head[onwards])), shape=(count, count), dtype=np.int32)
     left = pipes - maximum_flow(pipes, source, sink).flow
     left.data = np.maximum(left.data, 0)
     left.eliminate_zeros()
-    side = np.zeros(count + 2, dtype=bool)
+    side = np.zeros(count, dtype=bool)
     side[breadth_first_order(left, source, return_predecessors=False)] = True
-    return side[:count]
+    return side[number]

@@ -84,6 +84,7 @@ class SeamSearch:
     as_drawn : nothing else has helped, and they do along all creases, see `crease_sides.hard_borders`
     memory : what was found for parts, by their fingerprints, to which this search adds
     begun : surfaces of components on their way to coarse ones, and their triangles
+    models : of the coarse surface of what was found last, which is asked for first
     asked : the square of log(shear) that maps may have
     rehearse : gives that of a small surface along its seams, with half the logarithm of the density (n,) at its
         vertices or None; None where predictions have to do
@@ -103,6 +104,7 @@ class SeamSearch:
     as_drawn: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
     begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
+    models: dict[int, tuple[CoarseSurface, ScaleModel]] = field(default_factory=dict)
     asked: float = 0.0
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
     rehearsed: dict[bytes, float | None] = field(default_factory=dict)
@@ -157,7 +159,7 @@ class SeamSearch:
         asked = self.asked * float(np.interp(coarser, (0, 1), REHEARSED[::-1]))
         best, kept = yield from part_of(self._rehearsal(component).kept(best, asked), 0.7, 0.2)
         gave_up = kept is not None and kept > asked
-        self.memory[name] = replace(best.carried(component), rehearsed=kept, gave_up=gave_up)
+        self.memory[name] = replace(self._carried(best, component), rehearsed=kept, gave_up=gave_up)
         return self.memory[name].edges
 
     def _best(
@@ -219,9 +221,9 @@ class SeamSearch:
         best = yield from part_of(self._rehearsal(component).best_of(cuts, self.asked), GROWN, 0.2)
         return (yield from part_of(self._shortened(best), GROWN + 0.2, 0.8 - GROWN))
 
-    def _trials(self, component: CutComponent) -> int:
-        """Coarse surfaces to be tried; what is small has one, itself."""
-        return self.options.trials if component.vertex_count > self.options.vertices else 1
+    def _trials(self, component: CutComponent, finer: float = 1.0) -> int:
+        """Coarse surfaces of so many times the vertices to be tried; what is small has one, itself."""
+        return self.options.trials if component.vertex_count > round(finer * self.options.vertices) else 1
 
     def _several_grown(
         self,
@@ -263,9 +265,9 @@ class SeamSearch:
                 # What the map of the one before has told holds for those that are like it.
                 keeping = self._rehearsal(component).kept(best, share * told)
                 best, kept = yield from part_of(keeping, GROWN / 2, 1 - GROWN / 2)
-                return replace(best.carried(component), rehearsed=kept)
+                return replace(self._carried(best, component), rehearsed=kept)
             if best.cut.spread <= best.task.bound:
-                return best.carried(component)
+                return self._carried(best, component)
         elif spread >= NEARLY_THERE:
             best = yield from part_of(self._grown_further(component, found, spread), 0.0, GROWN / 2)
         if best is None or best.cut.spread > best.task.bound:
@@ -274,7 +276,13 @@ class SeamSearch:
                 free = yield from self._grown_finer(component, replace(found, mirror=None), spread)
                 best = best if free.is_stuck else free
         best = yield from part_of(self._shortened(best), GROWN, 1 - GROWN)
-        return replace(best.carried(component), is_stuck=best.is_stuck)
+        return replace(self._carried(best, component), is_stuck=best.is_stuck)
+
+    def _carried(self, best: CoarseCut, component: CutComponent) -> Found:
+        """A cut led along the edges of its component, whose model is kept for the next search."""
+        self.models.clear()
+        self.models[id(best.setting.coarse)] = best.setting.coarse, best.setting.model
+        return best.carried(component)
 
     def _rehearsal(self, component: CutComponent) -> Rehearsal:
         plane = self.costs().plane
@@ -302,7 +310,8 @@ class SeamSearch:
     def _recalled(self, component: CutComponent, found: Found, share: float) -> CoarseCut:
         """A cut as it was found, with the task to leave a share of what it does."""
         coarse = found.coarse
-        model = ScaleModel.of(coarse, self._log_density(component, coarse))
+        known = self.models.get(id(coarse))
+        model = ScaleModel.of(coarse, self._log_density(component, coarse)) if known is None else known[1]
         setting = self._setting(component, found.base, found.mirror, coarse, model)
         task = setting.task(0.0, found.root)
         cut = cut_along(task, found.steps)
@@ -311,7 +320,6 @@ class SeamSearch:
 
     def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown anew on finer surfaces, the best of several."""
-        trials = range(max(self.options.trials - 1, 1))
         before = component.positions[np.unique(component.ends[found.edges])]
 
         def bound(coarse: CoarseSurface, model: ScaleModel) -> float:
@@ -321,6 +329,7 @@ class SeamSearch:
 
         before_this = len(found.coarse.positions) / self.options.vertices
         finer = min(FINER * max(before_this, 1.0), FINEST)
+        trials = range(max(self._trials(component, finer) - 1, 1))
         cuts = yield from self._several_grown(component, found.base, found.mirror, bound, trials, finer)
         if not cuts:
             return (yield from self._grown_finer(component, replace(found, mirror=None), share))

@@ -63,7 +63,9 @@ def steps_of(value):
 # Rounds of a search for a bound of the shear.
 
 
-def round_of(areas, means, pressing=None, searched=None, memory=None, charts=None, maps=None, bound=1.35, edges=()):
+def round_of(
+    areas, means, pressing=None, searched=None, memory=None, charts=None, maps=None, bound=1.35, edges=(), steep=0.0
+):
     means = np.array(means, float)
     pressing = means if pressing is None else np.array(pressing, float)
     areas = np.array(areas, float)
@@ -71,7 +73,8 @@ def round_of(areas, means, pressing=None, searched=None, memory=None, charts=Non
     charts = charts or [SimpleNamespace(faces=np.array([k])) for k in range(len(areas))]
     maps = maps or [SimpleNamespace(failure=None) for _ in areas]
     cuts = cuts_of(edges)
-    return shear_search.Round(charts, maps, cuts, memory or {}, areas, means, pressing, bound, searched)
+    steep = np.broadcast_to(steep, areas.shape)
+    return shear_search.Round(charts, maps, cuts, memory or {}, areas, means, steep, pressing, bound, searched)
 
 
 def cutting(asked, new):
@@ -133,6 +136,14 @@ def test_charts_have_room_below_most_of_the_squared_logarithm():
 def test_what_is_allowed_is_the_bound_over_what_there_is():
     one = round_of([1], [1.1])
     assert one.share_allowed(0) == pytest.approx(0.95 * np.log(1.35) ** 2 / np.log(1.1) ** 2)
+
+
+@pytest.mark.parametrize("steep, room", [(0.0, True), (0.005, True), (0.009, False), (0.02, False)])
+def test_what_is_nearly_too_steep_has_no_room(steep, room):
+    one = round_of([1], [1.1], steep=steep)
+    assert one.has_room.tolist() == [room]
+    most = np.log(1.35) ** 2 / np.log(1.1) ** 2
+    assert one.share_allowed(0) <= 0.95 * most and (one.share_allowed(0) < 0.95) == (steep > 0.01)
 
 
 @pytest.mark.parametrize("rehearsed, mean, slack", [(1.0, 1.1, True), (None, 1.1, True), (1.0, 1.34, False)])
@@ -674,6 +685,38 @@ def test_drafts_and_direct_starts_are_flat_only_where_the_boundary_is_free(bound
     assert initial_map._draft_start(disk, "embedded", RunLog()).uv == "embedded"
 
 
+@pytest.mark.parametrize(
+    "changed, found",
+    [
+        ({}, "coarser"),
+        ({"energy": 500.0}, "direct"),
+        ({"least": 169}, "direct"),
+        ({"most": 168}, "direct"),
+        ({"far": True}, "direct"),
+        ({"boundary": "disk"}, "direct"),
+        ({"coarser": None}, "direct"),
+        ({"coarser": MeshError("no map")}, "direct"),
+    ],
+)
+def test_what_has_next_to_no_room_comes_by_way_of_a_coarser_mesh(changed, found, monkeypatch):
+    disk = disk_mesh(changed.get("boundary", "free"))
+    disk.__dict__["is_far"] = changed.get("far", False)
+    monkeypatch.setattr(initial_map, "TOO_COARSE", changed.get("least", 168))
+    monkeypatch.setattr(initial_map, "COARSE_ABOVE", changed.get("most", 169))
+    monkeypatch.setattr(initial_map, "_energy", lambda *_: changed.get("energy", 501.0))
+    monkeypatch.setattr(initial_map, "direct_initial_map", steps_of(SimpleNamespace(uv="direct")))
+
+    def coarser(*_):
+        outcome = changed.get("coarser", SimpleNamespace(uv="coarser"))
+        if isinstance(outcome, MeshError):
+            raise outcome
+        return outcome
+        yield
+
+    monkeypatch.setattr(initial_map, "coarse_initial_map", coarser)
+    assert drain(initial_map.roomier_initial_map(disk, 0.0, RunLog())).uv == found
+
+
 @pytest.mark.parametrize("evened", ["evened", None])
 def test_drafts_in_squares_are_evened_where_that_leaves_room(evened, monkeypatch):
     disk = disk_mesh("square", corners=np.arange(4))
@@ -914,6 +957,24 @@ def test_charts_that_are_as_before_keep_their_maps():
 
     assert drain(mirrored_charts.mapped_anew([new, known], [(known, "known")], map_charts)) == ["new", "known"]
     assert asked == [new]
+
+
+def test_charts_that_are_as_before_but_for_the_order_of_their_vertices_and_triangles_keep_their_maps():
+    V, F = meshes.grid(2, 2)
+    rng = np.random.default_rng(0)
+    order, rows = rng.permutation(len(V)), rng.permutation(len(F))
+    place, known = np.argsort(order), chart_of(V, F)
+    turned = np.roll(np.stack([place[F], known.corners])[:, rows], 1, axis=2).astype(np.int32)
+    new = replace(known, vertices=V[order], triangles=turned[0], corners=turned[1], faces=known.faces[rows])
+    chart_map = ChartMap(uv=V[:, :2] + 0.5, area_l1=0.0, area_sd=0.0, angle_mean=1.0, folds=0)
+
+    def map_charts(charts):
+        assert not charts
+        return []
+        yield
+
+    (found,) = drain(mirrored_charts.mapped_anew([new], [(known, chart_map)], map_charts))
+    np.testing.assert_array_equal(found.uv, new.vertices[:, :2] + 0.5)
 
 
 # Polygons cut for maps.

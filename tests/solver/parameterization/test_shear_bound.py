@@ -317,7 +317,8 @@ def test_what_came_apart_is_not_stuck_where_a_small_part_misses_as_much(area, st
 
     def found(areas, means, missed):
         areas, means = np.array(areas), np.array(means)
-        return shear_search.Round([None] * len(areas), [], None, {}, areas, means, means, 1.35, missed)
+        steep = np.zeros(len(areas))
+        return shear_search.Round([None] * len(areas), [], None, {}, areas, means, steep, means, 1.35, missed)
 
     before = found([1.0], [1.4], [0])
     now = found([1 - area, area], [1.1, 1.35 + 0.049 / area], [1])

@@ -247,10 +247,10 @@ def test_seams_of_what_is_symmetric_may_cost_more(residual, worth):
     assert search_of(costs=lambda: SimpleNamespace(plane=plane))._worth_of_symmetry() == worth
 
 
-@pytest.mark.parametrize("vertices, trials", [(10, 1), (5, 3)])
-def test_what_is_small_is_searched_on_itself_alone(vertices, trials):
+@pytest.mark.parametrize("vertices, finer, trials", [(10, 1.0, 1), (5, 1.0, 3), (5, 1.5, 3), (5, 2.0, 1)])
+def test_what_is_small_is_searched_on_itself_alone(vertices, finer, trials):
     options = SearchOptions(vertices=vertices, trials=3)
-    assert search_of(options=options)._trials(SimpleNamespace(vertex_count=10)) == trials
+    assert search_of(options=options)._trials(SimpleNamespace(vertex_count=10), finer) == trials
 
 
 def test_densities_of_a_coarse_surface_are_half_logarithms_about_their_mean():

@@ -251,6 +251,21 @@ def test_where_symmetric_cuts_have_nothing_left_to_grow_others_are_found(monkeyp
     assert further.mirror is None and len(further.steps)
 
 
+def test_the_model_of_what_was_found_last_is_not_made_again(monkeypatch):
+    V, F = meshes.two_bumps(12)
+    surface, made, of = triangle_surface(V, F), [], ScaleModel.of
+    search = SeamSearch(np.full(len(F), 0.02), surface, lambda: seam_costs(surface))
+    cut_to_disks(surface, search=search)
+    monkeypatch.setattr(ScaleModel, "of", staticmethod(lambda *given: made.append(given) or of(*given)))
+    again = replace(search, memory=dict(search.memory), share=np.ones(len(F)), adding=True)
+    known = cut_to_disks(surface, search=again).cuts
+    assert not made
+    # Without it, it is made anew and the same.
+    anew = replace(search, memory=dict(search.memory), share=np.ones(len(F)), adding=True, models={})
+    np.testing.assert_array_equal(cut_to_disks(surface, search=anew).cuts.edges, known.edges)
+    assert len(made) == 1
+
+
 def test_a_path_may_leave_the_mirror_plane_and_not_come_back():
     """One step that comes back is enough, whatever the others do; a path within the plane never left it."""
     ends = np.array([[0, 1], [1, 2], [2, 3], [1, 4], [4, 5]])

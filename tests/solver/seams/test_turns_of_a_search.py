@@ -214,6 +214,10 @@ class Grown:
     def task(self):
         return SimpleNamespace(bound=1.0)
 
+    @property
+    def setting(self):
+        return SimpleNamespace(coarse="coarse", model="model")
+
     def carried(self, component):
         return Carried(self.name)
 
