@@ -178,8 +178,10 @@ def _write(options: argparse.Namespace, shapes: list[Registered], surface, polyg
         for k, shape in enumerate(shapes)
     ]
     for row in table:
-        print(f"{row['file']}: rms {row['rms']:.4g}, greatest z-score {row['greatest_score']:.1f}, "
-              f"{row['vertices_beyond']} vertices beyond {options.score:g}")  # fmt: skip
+        judged = (
+            f"greatest z-score {row['greatest_score']:.1f}, {row['vertices_beyond']} vertices beyond {options.score:g}"
+        )
+        print(f"{row['file']}: rms {row['rms']:.4g}, {judged if len(table) > 2 else 'no z-scores of two shapes'}")
     for text in warnings:
         warn_of(text)
     if options.report is not None:

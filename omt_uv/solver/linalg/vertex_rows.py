@@ -304,21 +304,22 @@ class VertexRows:
 
     def between(self, motions: sp.csr_matrix) -> sp.csr_matrix:
         """What the matrix makes of every two of some motions, (2n,k) in the numbers of its rows: (k,k)."""
-        total = sp.csr_matrix((motions.shape[1],) * 2)
+        # Half of what is between vertices and those of later colours, and what is between them and themselves.
+        half, within = (sp.csr_matrix((motions.shape[1],) * 2) for _ in range(2))
         for k, both in enumerate(self.of_colours):
             own = self.pattern.rows(k)
             later = rows_between(motions, 2 * own.stop, motions.shape[0])
             itself = self._data[:, self.pattern.count :][:, own]
             for axis, rows in enumerate(both):
                 some = motions[2 * own.start + axis : 2 * own.stop : 2].T
-                half = some @ (rows @ later)
-                total = total + half + half.T
+                half = half + some @ (rows @ later)
                 for other, entries in enumerate(itself[axis].T):
                     moved = motions[2 * own.start + other : 2 * own.stop : 2]
                     moved.data *= np.repeat(entries, np.diff(moved.indptr))
-                    total = total + some @ moved
-                del some, half, moved
+                    within = within + some @ moved
+                del some, moved
                 give_back_often(len(self.pattern.order))
+        total = within + half + half.T
         return total if self._more is None else total + motions.T @ (self._more @ motions)
 
     def plain(self) -> sp.csc_matrix:

@@ -19,7 +19,7 @@ LEAST_DEVIATION = 0.05
 class MeanShape:
     """Mean (n,3) of shapes; aligned (k,n,3): they, turned and shifted onto it; distance (k,n): of every vertex from the
     mean; deviation (n,): root mean square of these; score (k,n): distance from the mean of all others over their
-    deviation."""
+    deviation, 0 of two shapes: one other has none."""
 
     mean: np.ndarray
     aligned: np.ndarray
@@ -62,5 +62,5 @@ def mean_shape(shapes: np.ndarray, weight: np.ndarray, scaled: bool = False) -> 
     apart = len(shapes) / (len(shapes) - 1)
     rest = np.sqrt(np.maximum(square.sum(axis=0) - apart * square, 0) / (len(shapes) - 1))
     least = LEAST_DEVIATION * np.einsum("n,kn->k", share, rest)[:, None]
-    score = apart * distance / np.maximum(np.maximum(rest, least), 1e-300)
+    score = apart * distance / np.maximum(np.maximum(rest, least), 1e-300) * (len(shapes) > 2)
     return MeanShape(mean, aligned, distance, np.sqrt(square.mean(axis=0)), score)

@@ -70,6 +70,9 @@ def test_the_mean_of_turned_copies_is_the_shape_and_what_is_off_stands_out():
     assert found.score.argmax() == 3 * len(V) + 7 and found.score.max() > 5
     sizes = np.arange(1, 5)[:, None, None]
     assert mean_shape(sizes * np.delete(shapes, 3, axis=0), np.ones(len(V)), True).deviation.max() < 0.2
+    # Neither of two is the rule for the other.
+    two, three = (mean_shape(shapes[:k], np.ones(len(V))) for k in (2, 3))
+    assert not two.score.any() and two.deviation.max() > 0 and 0 < three.score.max() < 1e3
     with pytest.raises(ValueError, match="two shapes"):
         mean_shape(shapes[:1], np.ones(len(V)))
 
