@@ -74,7 +74,7 @@ def vertex_graph(triangles: np.ndarray, n: int) -> csc_matrix:
 def _halved(coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """The points of the lower and the upper half of each part, (2p,s), by coordinates (d,n) and those of parts (p,r).
 
-    Parts are sorted each by itself, which takes a third of the time of all at once.
+    Parts are sorted each by itself, which takes two thirds of the time of all at once.
     """
     there = rows >= 0
     size = there.sum(axis=1)

@@ -46,7 +46,7 @@ AT_ONCE = 100_000
 FEW_AT_ONCE = 1 << 14
 # Pairs of corners of all cells up to which it is kept where each entry of a block belongs.
 MOST_PAIRS = 2 * 9 * AT_ONCE
-# Vertices up to which it is kept where blocks belong: of more, that takes as long as the memory is worth.
+# Vertices up to which it is kept where blocks belong: for more, memory is scarcer than the time to find it again.
 MOST_PLACED = 800_000
 # Axes of row and column within the block of two vertices.
 AXES = ((0, 0), (1, 0), (0, 1), (1, 1))
