@@ -93,9 +93,7 @@ def outcome(package, folder, capfd, monkeypatch):
                         point.co.z *= 1.1 + 0.4 * k
         before = twin_scenes.left()
         tables.clear()
-        capfd.readouterr()
-        why = twin_scenes.refusal(name, arguments)
-        lines = [line for line in capfd.readouterr().out.splitlines() if line.startswith(("Info", "Warn"))]
+        why, lines = twin_scenes.told(capfd, name, arguments)
         chosen = {o.name for o in bpy.data.objects if o.select_get() or o.mode == "EDIT"}
         mode = bpy.context.mode
         selected = {o.name: selection(o) for o in bpy.data.objects if o.type == "MESH"}

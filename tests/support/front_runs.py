@@ -159,9 +159,7 @@ def told(folder: Path, run, capfd) -> Iterator[tuple[str, object]]:
     summary = importlib.import_module("omt_uv.session.last_run").state
     for name, objects, arguments in OPERATORS:
         twin_scenes.begin(folder, objects)
-        capfd.readouterr()
-        why = twin_scenes.refusal(name, arguments)
-        lines = [line for line in capfd.readouterr().out.splitlines() if line.startswith(("Info", "Warn"))]
+        why, lines = twin_scenes.told(capfd, name, arguments)
         rows = [row for row in (summary.summary.rows if summary.summary else ()) if row[0] != "Time"]
         yield f"{name} {objects} {list(arguments.values())}", [why, lines, rows, left()]
     there = folder / "commands"

@@ -140,6 +140,13 @@ def refusal(name: str, arguments: dict) -> str | None:
     return None
 
 
+def told(capfd, name: str, arguments: dict) -> tuple[str | None, list[str]]:
+    """Run an operator: why it refused, and the lines of what it told."""
+    capfd.readouterr()
+    why = refusal(name, arguments)
+    return why, [line for line in capfd.readouterr().out.splitlines() if line.startswith(("Info", "Warn"))]
+
+
 def left() -> dict:
     """Everything about the mesh objects of the file that is open, and its images."""
     found = {image.name: {"size": tuple(image.size), "pixels": _pixels(image)} for image in bpy.data.images}

@@ -13,7 +13,7 @@ import numpy as np
 from ..analysis.feature_edges import fold_angles
 from ..maps.contacts import lies_apart
 from ..maps.development import developed
-from ..maps.overlap import covers_itself
+from ..maps.overlap import overlap_exceeds
 from ..mesh.geometry import as_points, face_areas
 from .component import CutComponent
 from .cut_graph import cut_classes, greedy_arcs
@@ -140,7 +140,7 @@ def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
     # What is not quite flat is laid somewhere else by its map.
     if gap.max() > FLAT * np.abs(flat).max() or lies_apart(flat, corners):
         return False
-    return covers_itself(as_points(flat)[corners], COVERED)
+    return overlap_exceeds(as_points(flat)[corners], COVERED)
 
 
 def defects(component: CutComponent) -> np.ndarray:

@@ -191,7 +191,8 @@ def minimum_degree(A: sp.spmatrix) -> np.ndarray:
 def fill(A: sp.spmatrix) -> int:
     """Entries of the lower factor of a symmetric pattern (n,n) whose unknowns are eliminated as they come."""
     # Both factors have as many; to take one out of SuperLU takes as long again as to find it, and as much memory.
-    return int(_splu(_dominant(A).astype(np.float32), "NATURAL").nnz) // 2
+    # Both factors have as many; to take one out of SuperLU takes as long as to find it, and as much memory.
+    return Factor(_dominant(A), "natural", single=True).entries // 2
 
 
 def _dominant(A: sp.spmatrix) -> sp.spmatrix:

@@ -30,7 +30,7 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     return _Areas(np.asarray(uv, float)).share(samples, seed)
 
 
-def covers_itself(uv: np.ndarray, bounds: Sequence[tuple[int, float]]) -> bool:
+def overlap_exceeds(uv: np.ndarray, bounds: Sequence[tuple[int, float]]) -> bool:
     """Whether `overlap_share` of triangles `uv` (m,3,2) is above the share of any of some bounds, each with the number
     of its samples: few first, which find what there is much of."""
     areas = _Areas(np.asarray(uv, float))

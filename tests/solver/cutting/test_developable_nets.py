@@ -78,7 +78,7 @@ def test_the_net_of_a_bracket_does_not_cover_itself():
 
 def test_a_net_whose_outline_does_not_cross_itself_is_not_sampled(monkeypatch):
     """Of a fan of slivers every sample would be compared with all."""
-    monkeypatch.setattr(developable_nets, "covers_itself", pytest.fail)
+    monkeypatch.setattr(developable_nets, "overlap_exceeds", pytest.fail)
     n = 500
     turn = 2 * np.pi * np.arange(n) / n
     V = np.concatenate([np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), [[0, 0, 2], [0, 0, 0]]])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.maps import overlap
-from omt_uv.solver.maps.overlap import covers_itself, overlap_share
+from omt_uv.solver.maps.overlap import overlap_exceeds, overlap_share
 
 
 def square(n=8):
@@ -94,10 +94,10 @@ def test_a_coarser_grid_finds_the_same(monkeypatch):
 
 
 @pytest.mark.parametrize("shift", [0.2, 0.9, 0.999, 1.0, 3.0])
-def test_a_map_covers_itself_where_it_is_above_any_bound(shift):
+def test_overlap_exceeds_bounds_where_it_is_above_any_of_them(shift):
     square = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
     uv = np.concatenate([square, square + [shift, 0]])
     for bounds in ([(100, 0.5), (4000, 0.01)], [(4000, 0.0)], [(100, 1.0), (100, 0.9)], []):
         above = any(overlap_share(uv, samples=samples) > share for samples, share in bounds)
-        assert covers_itself(uv, bounds) == above
-    assert covers_itself(uv, [(4000, 0.0)]) == (shift < 0.9995)
+        assert overlap_exceeds(uv, bounds) == above
+    assert overlap_exceeds(uv, [(4000, 0.0)]) == (shift < 0.9995)
