@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -20,9 +20,9 @@ from ..mesh.geometry import (
     laplacian_from_lengths,
 )
 from ..mesh.gluing import Gluing, groups
-from ..mesh.topology import first_places, halfedges
+from ..mesh.topology import first_places, halfedges, pair_keys
 from ..quads.recombination import with_shorter_diagonals
-from .component_order import in_order
+from .component_order import Outlined, in_order, motion
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
 # angle counts as these shares of its length. Shares near 1 keep cuts short: their length is bounded by them.
@@ -295,6 +295,70 @@ class Copies:
         # Thousands of parts with the same edges, and shapes of their own, are not compared with one another.
         shape = np.concatenate([np.ptp(mine[0], axis=0), [mine[0].mean(), np.linalg.norm(mine[0])]])
         return component.triangles.tobytes(), component.pair.tobytes(), np.round(shape / COARSE).tobytes()
+
+
+@dataclass(frozen=True)
+class TurnedCopies:
+    """Components with edges (e,) bool that were found for each, for others that are equal but for a motion, a mirrored
+    one, too: wheels, screws, both hands."""
+
+    known: list[tuple[CutComponent, Outlined, np.ndarray]] = field(default_factory=list)
+
+    def tell(self, component: CutComponent, edges: np.ndarray) -> None:
+        """Keep what was found for a component that is no copy."""
+        self.known.append((component, _outlined(component), edges))
+
+    def found_for(self, component: CutComponent) -> np.ndarray | None:
+        """What was found for a component that this one is a copy of; None where there is none."""
+        copy = self.of(component)
+        return None if copy is None else self.moved(self.known[copy[0]][2], copy[1])
+
+    def of(self, component: CutComponent) -> tuple[int, np.ndarray] | None:
+        """The number of a component that this one is a copy of, and its edge (e,) for each of the copy, -1 for
+        diagonals; None where there is none, or what it costs to cut the copy is something else."""
+        mine = _outlined(component)
+        for number, (other, its, _) in enumerate(self.known):
+            found = motion(its, mine)
+            if found is None:
+                continue
+            there, here = pair_keys(*other.ends.T), pair_keys(*found[0][component.ends].T)
+            order = np.argsort(there)
+            edge = order[np.minimum(np.searchsorted(there[order], here), len(order) - 1)]
+            edge = np.where((there[edge] == here) & np.isfinite(component.cost), edge, -1)
+            inner = edge >= 0
+            size = float(np.ptp(component.positions, axis=0).max())
+            dearer = np.abs(component.cost[inner] - other.cost[edge[inner]]).max(initial=0.0) > SAME * size
+            if not dearer and np.array_equal(component.avoid, other.avoid[found[0]]):
+                return number, edge
+        return None
+
+    @staticmethod
+    def moved(edges: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """Those of the edges (e,) bool of a component that a copy has, by their numbers (k,) there."""
+        return edges[edge] & (edge >= 0)
+
+
+class SideFinder(Protocol):
+    """What is searched for seams, and what was found before of where it comes apart along hard edges."""
+
+    @property
+    def as_drawn(self) -> bool:
+        """Whether creases count whether a body swells or not, and those that are diagonals of quads it was triangulated
+        from."""
+
+    @property
+    def borders(self) -> tuple[TurnedCopies, TurnedCopies]:
+        """Components and where they come apart, not as drawn and as drawn, which are added to."""
+
+    def wants(self, polygons: np.ndarray, marked: bool) -> bool:
+        """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
+
+
+def _outlined(component: CutComponent) -> Outlined:
+    """The vertices of a component, and its edges that may be cut, from both sides, and around it."""
+    ends, (tail, head) = component.ends[np.isfinite(component.cost)], halfedges(component.triangles)
+    border = np.column_stack([tail[component.boundary], head[component.boundary]])
+    return Outlined(component.positions, np.concatenate([ends, ends[:, ::-1], border]))
 
 
 def _relative(component: CutComponent) -> list[np.ndarray]:

@@ -7,17 +7,18 @@ an edge, neither can be laid flat. Sides come apart there; across straight edges
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
-from ..maps.overlap import covered_share, part_covered
+from ..maps.overlap import covered_share, covers_little
 from ..mesh.geometry import cross3, face_areas, lengths
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
-from .component import SMOOTH, CutComponent, make_component, with_quads
+from .component import SMOOTH, CutComponent, SideFinder, make_component, with_quads
 from .cut_graph import cut_classes
 from .developable_nets import BENT, HARD, MUCH, defects, net
 from .gluing_facts import cost_factors, diagonal_pairs, marked_triangles
@@ -87,18 +88,12 @@ SPECK = 3e-5
 
 
 def hard_borders(
-    surface: Surface,
-    gluing: Gluing,
-    positions: np.ndarray,
-    gone: np.ndarray,
-    wants: Callable[[np.ndarray, bool], bool],
-    as_drawn: bool = False,
+    surface: Surface, gluing: Gluing, positions: np.ndarray, gone: np.ndarray, search: SideFinder
 ) -> np.ndarray:
     """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which bodies of hard sides come apart.
 
     Bodies with a net that is short enough and lies beside itself, and those that are not searched, stay whole;
-    positions (n,3) in a unit box, wants: see `cuts.SeamFinder`; as_drawn : creases count whether a body swells or not,
-    and those that are diagonals of quads it was triangulated from
+    positions (n,3) in a unit box
     """
     left, number, found = gluing.without(gone), np.flatnonzero(~gone), np.zeros(len(gone), dtype=bool)
     component_of, classes = components(left), corner_classes(left)
@@ -110,24 +105,34 @@ def hard_borders(
         return found
     marked = np.unique(component_of[marked_triangles(surface, left)])
     free, factor, members = np.zeros(len(positions)), cost_factors(surface, left), groups(component_of)
-    pairs, diagonal = groups(np.append(component_of[left.first // 3], np.arange(len(members)))), None
+    pairs = groups(np.append(component_of[left.first // 3], np.arange(len(members))))
+    known = search.borders[int(search.as_drawn)]
+    diagonals = cache(lambda: diagonal_pairs(left, positions, factor))
     for k in creased:
-        if not wants(left.owner[members[k]], bool(np.isin(k, marked))):
+        if not search.wants(left.owner[members[k]], bool(np.isin(k, marked))):
             continue
         component = make_component(left, positions, classes, members[k], pairs[k][pairs[k] < len(number)], free, factor)
-        sides = hard_sides(component, as_drawn)
-        if sides is not None and not as_drawn:
-            # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
-            diagonal = diagonal_pairs(left, positions, factor) if diagonal is None else diagonal
-            found_again = diagonal[component.gluing_pair]
-            if found_again.any():
-                component = with_quads(component, found_again)
-                sides = hard_sides(component)
-        if sides is None:
-            found[number[component.gluing_pair[cap_borders(component)]]] = True
-        elif not _has_clear_net(component):
-            found[number[component.gluing_pair[side_borders(component, *sides)]]] = True
+        edges = known.found_for(component)
+        if edges is None:
+            edges = _borders(component, None if search.as_drawn else diagonals)
+            known.tell(component, edges)
+        found[number[component.gluing_pair[edges]]] = True
     return found
+
+
+def _borders(component: CutComponent, diagonals: Callable[[], np.ndarray] | None) -> np.ndarray:
+    """Edges (e,) bool along which a component comes apart; diagonals : gives pairs (p,) bool of the gluing that are
+    those of quads it was triangulated from, None where its creases count as they are."""
+    sides = hard_sides(component, diagonals is None)
+    if sides is not None and diagonals is not None:
+        # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
+        diagonal = diagonals()[component.gluing_pair]
+        if diagonal.any():
+            component = with_quads(component, diagonal)
+            sides = hard_sides(component)
+    if sides is None:
+        return cap_borders(component)
+    return np.zeros(len(component.pair), bool) if _has_clear_net(component) else side_borders(component, *sides)
 
 
 def cap_borders(component: CutComponent) -> np.ndarray:
@@ -420,15 +425,12 @@ def _lies_flat(
     """
     flat, corners, gap = _laid_out(component, border, rows)
     area = face_areas(component.positions, component.triangles[rows]).sum()
-    extent = (
-        float(np.ptp(component.positions[component.triangles[rows]], axis=(0, 1)).max()) if extent is None else extent
-    )
+    if extent is None:
+        extent = float(np.ptp(component.positions[component.triangles[rows]], axis=(0, 1)).max())
     return (
         gap <= GAP * extent
         and area >= filled * float(np.prod(_boxes(flat), axis=0).min())
-        # What is beside the rest takes a third of the time, and finds most of what lies on it.
-        and part_covered(flat, corners, np.flatnonzero(part[rows])) <= COVERED_PART
-        and covered_share(flat, corners, SAMPLES) <= COVERED
+        and covers_little(flat, corners, np.flatnonzero(part[rows]), (COVERED_PART, COVERED), SAMPLES)
     )
 
 

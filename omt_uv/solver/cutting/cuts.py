@@ -19,7 +19,7 @@ from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluin
 from ..mesh.surface import Surface, chosen_triangles
 from ..progress import Steps, drain, part_of
 from ..quads.diagonals import cut_along_shorter
-from .component import Copies, CutComponent, Topology, classify, make_component
+from .component import Copies, CutComponent, SideFinder, Topology, classify, make_component
 from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
@@ -46,7 +46,7 @@ UNSEEN = 0.1**2
 LONGER = 1.5
 
 
-class SeamFinder(Protocol):
+class SeamFinder(SideFinder, Protocol):
     """What finds the seams of components, beyond what makes them disks; see `seams.search.SeamSearch`."""
 
     @property
@@ -56,13 +56,6 @@ class SeamFinder(Protocol):
     @property
     def stays_whole(self) -> bool:
         """Whether bodies of hard sides do not come apart along these."""
-
-    @property
-    def as_drawn(self) -> bool:
-        """Whether all creases count for sides, see `crease_sides.hard_borders`."""
-
-    def wants(self, polygons: np.ndarray, marked: bool) -> bool:
-        """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
     @property
     def costs(self) -> Callable[[], SeamCosts]:
@@ -181,7 +174,7 @@ def cut_gluing(
         gone = partition_pairs(gluing, positions, one_sided)
     crowded = bool(gone.any())
     if search is not None and avoid is None and not search.stays_whole:
-        gone |= hard_borders(surface, gluing, positions, gone, search.wants, search.as_drawn)
+        gone |= hard_borders(surface, gluing, positions, gone, search)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
     holes, sieves, level = 0, not fill, np.zeros(len(gluing.triangles), dtype=bool)

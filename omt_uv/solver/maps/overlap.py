@@ -66,7 +66,11 @@ def covered_share(w: np.ndarray, triangles: np.ndarray, samples: int = SAMPLES) 
 
 def cover_pairs(uv: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which points (k,2) lie in which triangles `uv` (m,3,2): their numbers (c,) each, a pair for every time."""
-    grid = _Grid(uv)
+    return _pairs_in(_Grid(uv), points)
+
+
+def _pairs_in(grid: _Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the triangles of a grid."""
     begin, found = 0, []
     for chunk in _chunks(points, np.cumsum(grid.candidates(points))):
         point, triangle = grid.inside(chunk)
@@ -79,9 +83,29 @@ def cover_pairs(uv: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndar
 def part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> float:
     """Which share of some triangles (p,) others of them (t,3) with places (k,) complex cover, too: a small part of them
     is missed by samples of all."""
-    uv = np.stack([flat.real, flat.imag], axis=1)[corners]
+    uv = as_points(flat)[corners]
+    return _part_covered(uv, part, _Grid(uv))
+
+
+def covers_little(
+    w: np.ndarray, triangles: np.ndarray, part: np.ndarray, shares: tuple[float, float], samples: int
+) -> bool:
+    """Whether `part_covered` of triangles (p,) and `covered_share` of all (m,3) with places w (n,) complex are no more
+    than these two shares."""
+    if lies_apart(w, triangles):
+        return True
+    uv = as_points(w)[triangles]
+    areas = _Areas(uv)
+    if areas.grid is None or len(areas.area) < len(uv):
+        return part_covered(w, triangles, part) <= shares[0] and overlap_share(uv, samples=samples) <= shares[1]
+    # Most of the time is that of the grid.
+    return _part_covered(uv, part, areas.grid) <= shares[0] and areas.share(samples) <= shares[1]
+
+
+def _part_covered(uv: np.ndarray, part: np.ndarray, grid: _Grid) -> float:
+    """`part_covered` of triangles `uv` (m,3,2) with their grid."""
     inside = 0.75 * np.eye(3) + 0.25 / 3
-    point, over = cover_pairs(uv, np.einsum("kc,pcd->pkd", inside, uv[part]).reshape(-1, 2))
+    point, over = _pairs_in(grid, np.einsum("kc,pcd->pkd", inside, uv[part]).reshape(-1, 2))
     twice = np.unique(point[over != part[point // 3]])
     area = np.abs(signed_areas(uv[part].reshape(-1, 2), np.arange(3 * len(part)).reshape(-1, 3)))
     return float(area[twice // 3].sum() / (3 * area.sum()))

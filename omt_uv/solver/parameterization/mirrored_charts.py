@@ -10,15 +10,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..analysis.density import Target
 from ..canonical.markers import ChartMarkers
+from ..cutting.component_order import Outlined, motion, polygon_sides
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import MeshError
 from ..mesh.charts import Chart, sound_disks
-from ..mesh.geometry import cross3, edge_lengths, lengths, signed_areas
+from ..mesh.geometry import edge_lengths, signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads, partial_mirror
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
@@ -34,10 +34,6 @@ from .options import MapOptions
 SAME_DENSITY = 1e-4
 # Area error, over the goal, that a map of symmetric quads may leave in the triangles that they came as.
 AREA_KEPT = 1.5
-# Distance over the size of a chart up to which vertices of equal charts lie upon one another.
-SAME_PLACE = 1e-5
-# Most motions that are tried for a pair of charts.
-TRIALS = 32
 # Cuts may be so many times as long if they are symmetric then.
 LONGER = 1.5
 
@@ -164,77 +160,9 @@ def motion_between(first: Chart, other: Chart) -> tuple[np.ndarray, float] | Non
     n = len(first.vertices)
     if n != len(other.vertices) or len(first.patches) or len(other.patches):
         return None
-    # Squares of huge coordinates would be infinite.
-    unit = float(max(np.abs(first.vertices).max(), np.abs(other.vertices).max())) or 1.0
-    (a, sides_a), (b, sides_b) = _about_centre(first, unit), _about_centre(other, unit)
-    size = lengths(a[:, :3]).max()
-    if not size > 0:
-        return None
-    far = [np.sort(lengths(x[:, :3])) for x in (a, b)]
-    if len(sides_a) != len(sides_b) or np.abs(far[0] - far[1]).max() > SAME_PLACE * size:
-        return None
-    there = cKDTree(b / size)
-    keys = np.sort(sides_b[:, 0] * n + sides_b[:, 1])
-    start, trials = _beginnings(a, sides_a, b, sides_b, size)
-    for end, sign in trials:
-        rotation = _frame(b[end, :3], sign) @ _frame(a[start, :3]).T
-        moved = np.concatenate([a[:, :3] @ rotation.T, a[:, 3:] @ rotation.T], axis=1) / size
-        if not np.isfinite(moved).all():
-            # Places in a row have no frame.
-            continue
-        off, at = there.query(moved, distance_upper_bound=2 * SAME_PLACE)
-        if not np.isfinite(off).all() or len(np.unique(at)) < n:
-            continue
-        sides = at[sides_a if sign > 0 else sides_a[:, ::-1]]
-        if np.array_equal(np.sort(sides[:, 0] * n + sides[:, 1]), keys):
-            return np.argsort(at), sign
-    return None
-
-
-def _about_centre(chart: Chart, unit: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n,6) over a unit, about their mean, with the mean of their neighbours, and sides (k,2) of polygons."""
-    n, faces = len(chart.vertices), np.concatenate([chart.faces] * 3)
-    tail, head = (chart.triangles[:, k].T.ravel() for k in ((0, 1, 2), (1, 2, 0)))
-    low, high = np.minimum(tail, head), np.maximum(tail, head)
     # A diagonal has its own polygon on both sides.
-    _, place, count = np.unique(np.stack([low, high, faces]), axis=1, return_inverse=True, return_counts=True)
-    side = count[place.ravel()] == 1
-    tail, head = tail[side], head[side]
-    x = chart.vertices / unit
-    x = x - x.mean(axis=0)
-    both, of = np.concatenate([tail, head]), np.concatenate([head, tail])
-    number = np.maximum(np.bincount(both, minlength=n), 1)
-    around = np.stack([np.bincount(both, x[of, k], n) for k in range(3)], axis=1) / number[:, None]
-    return np.concatenate([x, around], axis=1), np.column_stack([tail, head])
-
-
-def _beginnings(a, sides_a, b, sides_b, size: float) -> tuple[np.ndarray, list[tuple[np.ndarray, float]]]:
-    """A side of the first chart that few others are like, and those of the other one that are, with the sign."""
-
-    def figures(x, sides):
-        p, q = x[sides[:, 0], :3], x[sides[:, 1], :3]
-        return np.column_stack([lengths(v) for v in (p, q, p - q, cross3(p, q) / size)]) / size
-
-    mine, theirs = figures(a, sides_a), figures(b, sides_b)
-    # A frame needs a side that does not point to the centre.
-    kinds, inverse, count = np.unique(np.round(mine, 4), axis=0, return_inverse=True, return_counts=True)
-    count = np.where(kinds[:, 3] > 1e-2, count, len(mine) + 1)
-    start = int(count[inverse.ravel()].argmin())
-    trials: list[tuple[np.ndarray, float]] = []
-    for sign, order in ((1.0, [0, 1, 2, 3]), (-1.0, [1, 0, 2, 3])):
-        like = np.flatnonzero((np.abs(theirs[:, order] - mine[start]) < 4 * SAME_PLACE).all(axis=1))
-        trials += [(sides_b[k][:: int(sign)], sign) for k in like[: TRIALS // 2]]
-    return sides_a[start], trials
-
-
-def _frame(points: np.ndarray, sign: float = 1.0) -> np.ndarray:
-    """Axes (3,3), in columns, of two points (2,3) and the origin; sign : of the third. No numbers where they lie in a
-    row."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        first = points[0] / np.linalg.norm(points[0])
-        second = points[1] - (points[1] @ first) * first
-        second = second / np.linalg.norm(second)
-    return np.column_stack([first, second, sign * cross3(first, second)])
+    sides = [polygon_sides(chart.triangles, chart.faces) for chart in (first, other)]
+    return motion(Outlined(first.vertices, sides[0]), Outlined(other.vertices, sides[1]))
 
 
 def with_mirrored_quads(surface: Surface, charts: Sequence[Chart]) -> list[Chart]:
@@ -419,3 +347,18 @@ def _numbered_as(chart: Chart, other: Chart, chart_map: ChartMap) -> ChartMap:
     uv = np.zeros_like(chart_map.uv)
     uv[here] = chart_map.uv[there]
     return replace(chart_map, uv=uv)
+
+
+def remembered(
+    refined: Callable[[Chart, ChartMap], Steps[np.ndarray]],
+) -> Callable[[Chart, ChartMap], Steps[np.ndarray]]:
+    """What refines the map of a chart, which gives for a chart with the same map again what it has found before."""
+    found: dict[tuple[bytes, ...], np.ndarray] = {}
+
+    def again(chart: Chart, chart_map: ChartMap) -> Steps[np.ndarray]:
+        name = tuple(a.tobytes() for a in (chart.corners, chart.triangles, chart.patches, chart_map.uv))
+        if name not in found:
+            found[name] = yield from refined(chart, chart_map)
+        return found[name]
+
+    return again

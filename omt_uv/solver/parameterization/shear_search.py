@@ -15,6 +15,7 @@ from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..analysis.straight_paths import closed_price
 from ..analysis.symmetry_plane import MirrorImages
+from ..cutting.component import TurnedCopies
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
@@ -98,6 +99,7 @@ class ShearSearch:
             asked=float(np.log(self.shear.bound) ** 2),
             rehearse=self.rehearsed if self.shear.bound >= LEAST_REHEARSED else None,
             rehearsed=self.rehearsals,
+            borders=self.borders,
         )
 
     def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
@@ -185,6 +187,11 @@ class ShearSearch:
     def rehearsals(self) -> dict[bytes, float | None]:
         """What small surfaces were found to shear: later searches come to the same ones."""
         return {}
+
+    @cached_property
+    def borders(self) -> tuple[TurnedCopies, TurnedCopies]:
+        """Where parts come apart along hard edges: later searches come to the same ones."""
+        return TurnedCopies(), TurnedCopies()
 
     @cached_property
     def images(self) -> MirrorImages | None:
@@ -439,11 +446,3 @@ def pressing_shear(mean: float, steep: float, bound: float) -> float:
 def joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
     """The same cuts, but along the edges (e,2)."""
     return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
-
-
-def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
-    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
-    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
-    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
-    most = float(pressing.max(initial=0.0)) / search.shear.bound
-    return most <= 1 or most > 1 + NEARLY

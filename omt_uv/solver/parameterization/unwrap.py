@@ -43,12 +43,13 @@ from .mirrored_charts import (
     map_completed,
     mirror_partners,
     mirrored_map,
+    remembered,
     with_images,
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
 from .shear_bound import bound_shear, in_pieces
-from .shear_search import ShearSearch, is_worth_bounding
+from .shear_search import NEARLY, Round, ShearSearch
 from .small_charts import is_small, map_together
 
 # Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps; at last those of pieces.
@@ -146,7 +147,7 @@ def unwrap(
     task = _Task(cut.surface, options, pins, target, markers, cut_anew=search is not None)
     prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
-    crossing = task.crossing if pins is None and task.options.boundary == "free" else None
+    crossing = remembered(task.crossing) if pins is None and task.options.boundary == "free" else None
     said, settled = prepared.warnings, search is None
     missed: tuple[str, ...] = ()
     if search is not None:
@@ -168,6 +169,14 @@ def unwrap(
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)
     return SurfaceMap(charts, maps, cuts, (*said, *missed))
+
+
+def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
+    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
+    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
+    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
+    most = float(pressing.max(initial=0.0)) / search.shear.bound
+    return most <= 1 or most > 1 + NEARLY
 
 
 def cut_for_a_map(first: list[ChartMap], maps: list[ChartMap]) -> list[str]:

@@ -39,6 +39,7 @@ class Found:
     polygons (k,) : of the part
     gave_up : no longer cut seemed to be worth what it costs, though that is more than was asked for
     is_stuck : it was asked for more, and hardly anything was left to grow
+    is_copy : it was found for another part, which this one is a copy of, and is not gone on from
     """
 
     edges: np.ndarray
@@ -51,6 +52,7 @@ class Found:
     rehearsed: float | None = None
     gave_up: bool = False
     is_stuck: bool = False
+    is_copy: bool = False
 
 
 @dataclass(frozen=True)

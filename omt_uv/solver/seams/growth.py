@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -34,18 +36,22 @@ class _Arc:
 
 def grow(task: Task, cut: Cut, most: int) -> Cut:
     """The cut with arcs added until the spread is within the bound; at most so many, each where it pays most."""
-    model = None
-    for _ in range(most):
-        if cut.spread <= task.bound or cut.cost > MOST_COST:
-            break
-        model = task.model.cut(cut.vertices) if model is None else model
-        found = _arcs(task, cut, model)
-        if not found or (found[0].worth < LEAST_WORTH * cut.spread and len(cut.steps)):
-            break
-        grown = _with_arc(task, cut, found[0])
-        model = model.cut(np.setdiff1d(grown.vertices, cut.vertices))
+    for grown in islice(growing(task, cut), most):
         cut = grown
     return cut
+
+
+def growing(task: Task, cut: Cut) -> Iterator[Cut]:
+    """The cut with one arc more after another, each where it pays most, until the spread is within the bound."""
+    model, held = task.model, np.zeros(0, np.int64)
+    while cut.spread > task.bound and cut.cost <= MOST_COST:
+        # What was cut before stays held: of a long cut, all at once would take most of the time.
+        model, held = model.cut(np.setdiff1d(cut.vertices, held)), cut.vertices
+        found = _arcs(task, cut, model)
+        if not found or (found[0].worth < LEAST_WORTH * cut.spread and len(cut.steps)):
+            return
+        cut = _with_arc(task, cut, found[0])
+        yield cut
 
 
 def grown_by_one(task: Task, cut: Cut, most: int) -> list[Cut]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..analysis.seam_costs import SeamCosts
 from ..analysis.symmetry_plane import NEAR
-from ..cutting.component import CutComponent, fingerprint
+from ..cutting.component import CutComponent, TurnedCopies, fingerprint
 from ..mesh.geometry import below_one
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
@@ -22,7 +23,7 @@ from .coarse_cut import CoarseCut, Found, Setting, best_of, hub
 from .coarse_surface import Coarsening, CoarseSurface, coarsening
 from .cut_tree import Cut, Task, cut_along
 from .fine_paths import FineMirror, with_line
-from .growth import grow
+from .growth import growing
 from .improvement import improved, rerouted, trimmed
 from .options import SPREAD_BY_SHEAR, SearchOptions
 from .path_graph import REACHED
@@ -89,6 +90,8 @@ class SeamSearch:
     rehearse : gives that of a small surface along its seams, with half the logarithm of the density (n,) at its
         vertices or None; None where predictions have to do
     rehearsed : what it has given
+    copies : the parts that this search has found seams for
+    borders : parts and where they come apart at hard edges, as they are and as drawn, to which this search adds
     """
 
     spread: np.ndarray
@@ -108,6 +111,8 @@ class SeamSearch:
     asked: float = 0.0
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
     rehearsed: dict[bytes, float | None] = field(default_factory=dict)
+    copies: TurnedCopies = field(default_factory=TurnedCopies)
+    borders: tuple[TurnedCopies, TurnedCopies] = field(default_factory=lambda: (TurnedCopies(), TurnedCopies()))
 
     @property
     def is_again(self) -> bool:
@@ -130,11 +135,30 @@ class SeamSearch:
 
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut: with these,
-        or such as are symmetric where the component is."""
+        or such as are symmetric where the component is; those of a part before it that is equal but for a motion."""
         yield Progress("Seams", 0.0)
+        copy = self.copies.of(component) if self.density is None else None
+        if copy is not None:
+            return self._as_copied(component, *copy)
+        edges = yield from self._searched(component, base)
+        self.copies.tell(component, edges)
+        return edges
+
+    def _as_copied(self, component: CutComponent, number: int, edge: np.ndarray) -> np.ndarray:
+        """Seams (e,) bool as those of a part searched before, whose edges (e,) these are, or -1 for none."""
+        other, _, edges = self.copies.known[number]
+        edges, found = self.copies.moved(edges, edge), self.memory.get(fingerprint(other))
+        if found is not None:
+            base, polygons = self.copies.moved(found.base, edge), component.polygons[component.polygons >= 0]
+            copied = replace(found, edges=edges, base=base, polygons=polygons, is_copy=True)
+            self.memory[fingerprint(component)] = copied
+        return edges
+
+    def _searched(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
+        """Seams of a component that is no copy."""
         name, polygons = fingerprint(component), component.polygons[component.polygons >= 0]
         share = 1.0 if self.share is None else float(self.share[polygons].min())
-        if self.share is not None and name in self.memory:
+        if self.share is not None and name in self.memory and not self.memory[name].is_copy:
             self.memory[name] = yield from self._again(self.priced(component), self.memory[name], share)
             return self.memory[name].edges
         bound = float(self.spread[polygons].min())
@@ -365,10 +389,7 @@ class SeamSearch:
         """The cut of arcs that pay most, one after another, from a cut on or from nothing."""
         cut = cut_along(task, np.zeros(0, np.int64)) if cut is None else cut
         begin = max(cut.spread, task.bound)
-        for count in range(self.options.arcs):
-            grown = grow(task, cut, 1)
-            if grown is cut:
-                break
+        for count, grown in enumerate(islice(growing(task, cut), self.options.arcs)):
             cut = grown
             # What is flat once it is cut has no spread at all.
             done = np.log(begin / max(cut.spread, task.bound)) / max(np.log(begin / task.bound), 1e-9)

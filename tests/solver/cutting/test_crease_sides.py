@@ -1,12 +1,14 @@
 """Bodies of flat and round sides come apart along their creases, and lie undistorted; all others stay whole."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import meshes
 import numpy as np
 import pytest
 from short_cuts import component_of
 
+from omt_uv.solver.cutting.component import TurnedCopies
 from omt_uv.solver.cutting.crease_sides import cap_borders, hard_borders, hard_sides, lone_edges, side_borders
 from omt_uv.solver.cutting.gluing_facts import in_unit_box
 from omt_uv.solver.maps.overlap import part_covered
@@ -424,13 +426,15 @@ def test_the_bevel_of_an_end_is_not_combed():
     assert len(wall.vertices) == 33 * len(profile)
 
 
-def borders_of(surface, sharp=(), **options):
+def borders_of(surface, sharp=(), as_drawn=False):
     """The keys of the edges along which a surface comes apart."""
     surface = replace(surface, sharp=np.array(sharp, np.int64).reshape(-1, 2))
     gluing = repaired_gluing(surface, *chosen_triangles(surface, None)).gluing
     positions = in_unit_box(surface, gluing)[0]
     gone = np.zeros(len(gluing.first), bool)
-    found = hard_borders(surface, gluing, positions, gone, lambda *_: True, **options)
+    known = TurnedCopies(), TurnedCopies()
+    search = SimpleNamespace(wants=lambda *_: True, as_drawn=as_drawn, borders=known)
+    found = hard_borders(surface, gluing, positions, gone, search)
     return set(pair_keys(*gluing.ends(gluing.first[found])).tolist())
 
 

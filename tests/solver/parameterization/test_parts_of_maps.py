@@ -11,6 +11,7 @@ import pytest
 
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.straight_paths import TURN
+from omt_uv.solver.cutting import component_order
 from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import MeshError, PinError
 from omt_uv.solver.mesh.charts import Chart
@@ -884,13 +885,13 @@ def test_triangles_are_squeezed_where_their_area_is_rounding_of_their_charts(sha
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_frames_are_axes_of_two_points(sign):
     points = np.array([[2.0, 0, 0], [5.0, 3.0, 0]])
-    np.testing.assert_allclose(mirrored_charts._frame(points, sign), np.diag([1, 1, sign]))
+    np.testing.assert_allclose(component_order._frame(points, sign), np.diag([1, 1, sign]))
     turned = points @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    frame = mirrored_charts._frame(turned, sign)
+    frame = component_order._frame(turned, sign)
     np.testing.assert_allclose(frame.T @ frame, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(frame.T @ turned.T, [[2, 5], [0, 3], [0, 0]], atol=1e-12)
     assert np.linalg.det(frame) == pytest.approx(sign)
-    assert not np.isfinite(mirrored_charts._frame(np.array([[1.0, 0, 0], [2.0, 0, 0]]))).all()
+    assert not np.isfinite(component_order._frame(np.array([[1.0, 0, 0], [2.0, 0, 0]]))).all()
 
 
 @pytest.mark.parametrize("off, same", [(0.0, True), (0.5e-4, True), (1e-3, False)])
