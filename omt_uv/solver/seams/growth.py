@@ -45,8 +45,12 @@ def growing(task: Task, cut: Cut) -> Iterator[Cut]:
     """The cut with one arc more after another, each where it pays most, until the spread is within the bound."""
     model, held = task.model, np.zeros(0, np.int64)
     while cut.spread > task.bound and cut.cost <= MOST_COST:
-        # What was cut before stays held: of a long cut, all at once would take most of the time.
-        model, held = model.cut(np.setdiff1d(cut.vertices, held)), cut.vertices
+        if len(held) > 1:
+            # What was cut before stays held: of a long cut, all at once would take most of the time.
+            new = np.setdiff1d(cut.vertices, held)
+            model, held = model.cut(new, task.model.plate.own(new)), cut.vertices
+        else:
+            model, held = task.model.cut(cut.vertices), cut.vertices
         found = _arcs(task, cut, model)
         if not found or (found[0].worth < LEAST_WORTH * cut.spread and len(cut.steps)):
             return

@@ -53,20 +53,22 @@ class Held:
         """The answer to a load (n,) by Green's function (n,n)."""
         return Held(green @ load, green, np.zeros((0, len(load))))
 
-    def at(self, vertices: np.ndarray) -> Held:
-        """Held at the vertices (k,), too."""
-        root = np.linalg.cholesky(self.between(vertices))
+    def at(self, vertices: np.ndarray, own: np.ndarray | None = None) -> Held:
+        """Held at the vertices (k,), too; own : see `between`."""
+        root = np.linalg.cholesky(self.between(vertices, own))
         taken = self.green[vertices] - self.rows[:, vertices].T @ self.rows
         rows = solve_triangular(root, taken, lower=True)
         value = self.value - rows.T @ solve_triangular(root, self.value[vertices], lower=True)
         return Held(value, self.green, np.concatenate([self.rows, rows]))
 
-    def between(self, vertices: np.ndarray) -> np.ndarray:
-        """Green's function (k,k) between vertices (k,) that are to be cut."""
+    def between(self, vertices: np.ndarray, own: np.ndarray | None = None) -> np.ndarray:
+        """Green's function (k,k) between vertices (k,) that are to be cut; own (k,) : at each of them, before others
+        were cut that are to count as cut at once with these."""
         part = self.rows[:, vertices]
         block = self.green[np.ix_(vertices, vertices)] - part.T @ part
-        own, at = block.diagonal(), np.diag_indices(len(vertices))
-        if len(vertices) > 1:
+        at = np.diag_indices(len(vertices))
+        if own is not None or len(vertices) > 1:
+            own = block.diagonal() if own is None else own
             # The first pin of a closed surface takes all of its load: what gave way there would be a spread that stays.
             block[at] += ROUNDING * own + LEAST_ROUNDING * own.max()
         # What others hold already answers with nothing, but by rounding.
@@ -140,11 +142,11 @@ class ScaleModel:
         fall = prefix_energies(self.plate.between(vertices), self.plate.value[vertices])
         return np.maximum.accumulate(np.where(np.isfinite(fall), fall, 0.0))
 
-    def cut(self, vertices: np.ndarray) -> ScaleModel:
-        """The model of the surface cut at the vertices (k,)."""
+    def cut(self, vertices: np.ndarray, own: np.ndarray | None = None) -> ScaleModel:
+        """The model of the surface cut at the vertices (k,); own : see `Held.between`."""
         if len(vertices) == 0:
             return self
-        return replace(self, plate=self.plate.at(vertices))
+        return replace(self, plate=self.plate.at(vertices, own))
 
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""
