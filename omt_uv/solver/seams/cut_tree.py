@@ -41,7 +41,7 @@ class Cut:
 
 def cut_along(task: Task, steps: np.ndarray) -> Cut:
     """The cut along steps (k,)."""
-    steps = np.unique(steps)
+    steps = np.flatnonzero(are_in(steps, len(task.graph.cost)))
     vertices = task.graph.vertices_of(steps)
     cost = float(task.graph.cost[steps].sum())
     return Cut(steps=steps, vertices=vertices, spread=task.model.spread_cut(vertices), cost=cost)
@@ -102,11 +102,17 @@ class Removal:
 
 def _with_the_last(vertices: np.ndarray, when: np.ndarray, needed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (k,) that are named (m,) as often as is needed (n,), and when (k,) that is so: with the last."""
-    named, place, count = np.unique(vertices, return_inverse=True, return_counts=True)
-    last = np.zeros(len(named), np.int64)
-    np.maximum.at(last, place, when)
-    enough = needed[named] == count
-    return named[enough], last[enough]
+    count, last = np.bincount(vertices, minlength=len(needed)), np.zeros(len(needed), np.int64)
+    np.maximum.at(last, vertices, when)
+    enough = np.flatnonzero((needed == count) & (count > 0))
+    return enough, last[enough]
+
+
+def are_in(numbers: np.ndarray, count: int) -> np.ndarray:
+    """Which of so many numbers from 0 (count,) bool are among these (k,)."""
+    among = np.zeros(count, dtype=bool)
+    among[numbers] = True
+    return among
 
 
 def _with_images(graph: PathGraph, vertices: np.ndarray) -> np.ndarray:
@@ -145,5 +151,5 @@ def _by_stretch(graph: PathGraph, steps: np.ndarray) -> tuple[list[np.ndarray], 
     place = np.where(node[ends], n + np.arange(2 * k).reshape(k, 2), ends)
     label = graph_components(place[:, 0], place[:, 1], n + 2 * k)[1][place[:, 0]]
     total = np.bincount(label, graph.cost[steps])
-    order = np.argsort(-total, kind="stable")[: len(np.unique(label))]
+    order = np.argsort(-total, kind="stable")[: np.count_nonzero(np.bincount(label))]
     return [steps[label == c] for c in order], degree

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mesh.topology import graph_components
-from .cut_tree import Cut, Removal, Task, cut_along, leaves, stretches
+from .cut_tree import Cut, Removal, Task, are_in, cut_along, leaves, stretches
 from .growth import grow
 from .path_graph import path_to
 
@@ -72,10 +72,13 @@ def trimmed(task: Task, cut: Cut) -> Cut:
 
 def rerouted(task: Task, cut: Cut) -> Cut:
     """The cut with stretches replaced by the cheapest that join the same parts, where that is better."""
+    count = len(task.graph.cost)
     for stretch in stretches(task.graph, cut.steps):
-        if not np.isin(stretch, cut.steps).all():
+        left = are_in(cut.steps, count)
+        if not left[stretch].all():
             continue
-        rest = np.setdiff1d(cut.steps, stretch)
+        left[stretch] = False
+        rest = np.flatnonzero(left)
         path = _bridge(task, stretch, rest)
         steps = stretch if path is None else task.graph.steps_of(path)
         if set(steps.tolist()) == set(stretch.tolist()):
@@ -95,8 +98,8 @@ def _bridge(task: Task, stretch: np.ndarray, rest: np.ndarray) -> np.ndarray | N
     label = graph_components(np.concatenate([a, boundary]), np.concatenate([b, np.full(len(boundary), n)]), n + 1)[1]
     used = np.zeros(n, dtype=bool)
     used[a] = used[b] = used[boundary] = True
-    touched = np.unique(graph.ends[stretch])
-    parts = np.unique(label[touched[used[touched]]])
+    touched = graph.ends[stretch].ravel()
+    parts = np.flatnonzero(are_in(label[touched[used[touched]]], n + 1))
     if len(parts) != 2:
         return None
     one, other = (np.flatnonzero(used & (label[:n] == part)) for part in parts)

@@ -68,9 +68,10 @@ class PathGraph:
 
     def vertices_of(self, steps: np.ndarray) -> np.ndarray:
         """Vertices (k,) of steps and of their mirror images, off the boundary, sorted."""
+        among = np.zeros(len(self.boundary), dtype=bool)
         vertices = self.ends[steps].ravel()
-        vertices = np.union1d(vertices, self.image[vertices])
-        return vertices[~self.boundary[vertices]]
+        among[vertices] = among[self.image[vertices]] = True
+        return np.flatnonzero(among & ~self.boundary)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Held:
         """Green's function (k,k) between vertices (k,) that are to be cut; own (k,) : at each of them, before others
         were cut that are to count as cut at once with these."""
         part = self.rows[:, vertices]
-        block = self.green[np.ix_(vertices, vertices)] - part.T @ part
+        block = self.green[vertices[:, None], vertices] - part.T @ part
         at = np.diag_indices(len(vertices))
         if own is not None or len(vertices) > 1:
             own = block.diagonal() if own is None else own
