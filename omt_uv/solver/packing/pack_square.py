@@ -7,7 +7,7 @@ the margin lies between islands and the border: tiles side by side have it whole
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -53,6 +53,8 @@ CHANCE = 0.15
 # place before.
 MANY_ITEMS = 100
 HOPEFUL = 0.8
+# Masks of so many cells are kept with their turns.
+SMALL_MASK = 4096
 # Boxes of islands that go into blocks are so much apart, in cells, at least.
 APART = 1e-6
 # Coordinates beyond 2 to this power, or its inverse, are scaled before they are squared.
@@ -71,7 +73,8 @@ class Packing:
 
 @dataclass(frozen=True)
 class _PackTask:
-    """Outlines of islands, their triangles' area, and what the square is: pixels, margin, and outlines that stay."""
+    """Outlines of islands, their triangles' area, and what the square is: pixels, margin, and outlines that stay; and
+    small masks that were turned."""
 
     outlines: list[IslandOutline]
     areas: np.ndarray
@@ -81,6 +84,7 @@ class _PackTask:
     texture_size: int
     raster: int
     staying: list[IslandOutline]
+    small: dict[tuple, Item] = field(default_factory=dict)
 
     @property
     def cells_per_pixel(self) -> float:
@@ -91,6 +95,15 @@ class _PackTask:
     def growth(self) -> float:
         """Half of the margin, in cells."""
         return 0.5 * self.margin * self.cells_per_pixel
+
+    def item(self, mask: np.ndarray, quarters: tuple[int, ...]) -> Item:
+        """A mask (h,w) bool in its turns. At most scales small islands have the same mask, and many are alike."""
+        if mask.size > SMALL_MASK:
+            return turned_masks(mask, quarters)
+        name = mask.shape, quarters, mask.tobytes()
+        if name not in self.small:
+            self.small[name] = turned_masks(mask, quarters)
+        return self.small[name]
 
 
 @dataclass(frozen=True)
@@ -314,14 +327,14 @@ def _rasterised(task: _PackTask, scale: float) -> _Raster:
     items, corners = [], np.zeros((len(single), 2))
     for k, number in enumerate(single.tolist()):
         cells, low = grown_cells(task.outlines[number].scaled(scale, scale * task.low[number]), task.growth)
-        items.append(turned_masks(cells, QUARTERS if turnable[number] else (0,)))
+        items.append(task.item(cells, QUARTERS if turnable[number] else (0,)))
         corners[k] = low
     blocks = []
     if count > len(single):
         rest = largest[len(single) :]
         boxes = task.sizes[rest] * scale + 2 * task.growth + APART
         blocks = [Block(rest[b.members], b.corners, b.size) for b in blocks_of(boxes, BLOCKS)]
-        items += [turned_masks(np.ones(np.ceil(b.size[::-1]).astype(int), dtype=bool), (0,)) for b in blocks]
+        items += [task.item(np.ones(np.ceil(b.size[::-1]).astype(int), dtype=bool), (0,)) for b in blocks]
     return _Raster(items, single, corners, blocks)
 
 
