@@ -302,22 +302,23 @@ class TurnedCopies:
     """Components with edges (e,) bool that were found for each, for others that are equal but for a motion, a mirrored
     one, too: wheels, screws, both hands."""
 
-    known: list[tuple[CutComponent, Outlined, np.ndarray]] = field(default_factory=list)
+    known: dict[tuple[int, ...], list[tuple[CutComponent, Outlined, np.ndarray]]] = field(default_factory=dict)
 
     def tell(self, component: CutComponent, edges: np.ndarray) -> None:
         """Keep what was found for a component that is no copy."""
-        self.known.append((component, _outlined(component), edges))
+        mine = _outlined(component)
+        self.known.setdefault(self._name(mine), []).append((component, mine, edges))
 
     def found_for(self, component: CutComponent) -> np.ndarray | None:
         """What was found for a component that this one is a copy of; None where there is none."""
         copy = self.of(component)
-        return None if copy is None else self.moved(self.known[copy[0]][2], copy[1])
+        return None if copy is None else self.moved(copy[1], copy[2])
 
-    def of(self, component: CutComponent) -> tuple[int, np.ndarray] | None:
-        """The number of a component that this one is a copy of, and its edge (e,) for each of the copy, -1 for
+    def of(self, component: CutComponent) -> tuple[CutComponent, np.ndarray, np.ndarray] | None:
+        """A component that this one is a copy of, what was found for it, and its edge (e,) for each of the copy, -1 for
         diagonals; None where there is none, or what it costs to cut the copy is something else."""
         mine = _outlined(component)
-        for number, (other, its, _) in enumerate(self.known):
+        for other, its, edges in self.known.get(self._name(mine), []):
             found = motion(its, mine)
             if found is None:
                 continue
@@ -329,8 +330,13 @@ class TurnedCopies:
             size = float(np.ptp(component.positions, axis=0).max())
             dearer = np.abs(component.cost[inner] - other.cost[edge[inner]]).max(initial=0.0) > SAME * size
             if not dearer and np.array_equal(component.avoid, other.avoid[found[0]]):
-                return number, edge
+                return other, edges, edge
         return None
+
+    def _name(self, outlined: Outlined) -> tuple[int, ...]:
+        # Thousands of leaves of as many vertices are not compared with one another.
+        size = float(np.linalg.norm(outlined.vertices - outlined.vertices.mean(axis=0)))
+        return len(outlined.vertices), len(outlined.sides), round(float(np.log(max(size, 1e-300))) / COARSE)
 
     @staticmethod
     def moved(edges: np.ndarray, edge: np.ndarray) -> np.ndarray:

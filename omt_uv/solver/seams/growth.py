@@ -72,9 +72,9 @@ def _arcs(task: Task, cut: Cut, model: ScaleModel) -> list[_Arc]:
     """The best arc to each of the extremities, those first that are worth most."""
     graph = task.graph
     # Not from images: a path there would hang on nothing where these are not quite on the other side.
-    begin = graph.boundary.copy()
-    begin[graph.ends[cut.steps]] = True
-    start = np.flatnonzero(begin)
+    reached = graph.boundary.copy()
+    reached[graph.ends[cut.steps]] = True
+    start = np.flatnonzero(reached)
     cost, before = graph.paths_from(start)
     found = []
     for tip in _tips(task, model, cost):

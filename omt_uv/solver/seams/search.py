@@ -90,7 +90,7 @@ class SeamSearch:
     rehearse : gives that of a small surface along its seams, with half the logarithm of the density (n,) at its
         vertices or None; None where predictions have to do
     rehearsed : what it has given
-    copies : the parts that this search has found seams for
+    copies : the parts that this search, and none that it was made from, has found seams for
     borders : parts and where they come apart at hard edges, as they are and as drawn, to which this search adds
     """
 
@@ -111,7 +111,7 @@ class SeamSearch:
     asked: float = 0.0
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
     rehearsed: dict[bytes, float | None] = field(default_factory=dict)
-    copies: TurnedCopies = field(default_factory=TurnedCopies)
+    copies: TurnedCopies = field(default_factory=TurnedCopies, init=False)
     borders: tuple[TurnedCopies, TurnedCopies] = field(default_factory=lambda: (TurnedCopies(), TurnedCopies()))
 
     @property
@@ -144,9 +144,10 @@ class SeamSearch:
         self.copies.tell(component, edges)
         return edges
 
-    def _as_copied(self, component: CutComponent, number: int, edge: np.ndarray) -> np.ndarray:
-        """Seams (e,) bool as those of a part searched before, whose edges (e,) these are, or -1 for none."""
-        other, _, edges = self.copies.known[number]
+    def _as_copied(
+        self, component: CutComponent, other: CutComponent, edges: np.ndarray, edge: np.ndarray
+    ) -> np.ndarray:
+        """Seams (e,) bool as those of another part (k,) bool, whose edges (e,) these are, or -1 for none."""
         edges, found = self.copies.moved(edges, edge), self.memory.get(fingerprint(other))
         if found is not None:
             base, polygons = self.copies.moved(found.base, edge), component.polygons[component.polygons >= 0]

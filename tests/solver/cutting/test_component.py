@@ -8,7 +8,7 @@ import pytest
 from short_cuts import component_of, gluing_of
 
 from omt_uv.solver.analysis.seam_costs import seam_costs
-from omt_uv.solver.cutting.component import Copies, boundary_vertices, classify, fingerprint, fold_angles
+from omt_uv.solver.cutting.component import Copies, TurnedCopies, boundary_vertices, classify, fingerprint, fold_angles
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.gluing import components, corner_classes
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -99,6 +99,56 @@ def test_many_copies_are_cut_alike_and_searched_once(monkeypatch):
     assert len(searched) == 1
     each = [np.unique(np.sort(edges[edges[:, 0] // len(V) == k] % len(V), axis=1), axis=0) for k in range(len(places))]
     assert all(np.array_equal(each[0], other) for other in each) and len(each[0])
+
+
+def turned_by(V, seed, sign=1.0):
+    """Vertices turned at random, and mirrored where the sign is -1."""
+    axes = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return V @ (axes * np.sign(np.linalg.det(axes)) * [1, 1, sign]).T
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_copies_that_are_turned_have_the_same_edges(sign):
+    """Whatever their numbers; not what is bent or costs something else."""
+    V, F = meshes.bumpy(5, 4)
+    V[:, 2] += 0.1 * V[:, 0] ** 2 + 0.05 * V[:, 0] * V[:, 1]
+    first, chosen = component_of(V, F), np.zeros(len(component_of(V, F).pair), bool)
+    chosen[[1, 4, 7]] = True
+    copies = TurnedCopies()
+    copies.tell(first, chosen)
+    W, order = turned_by(V, 1, sign) + [3, 1, 2], np.random.default_rng(0).permutation(len(V))
+    faces = np.argsort(order)[F if sign > 0 else F[:, ::-1]]
+    copy = component_of(W[order], faces)
+    other, edges, edge = copies.of(copy)
+    assert other is first and edges is chosen and sorted(edge.tolist()) == list(range(len(first.pair)))
+    np.testing.assert_allclose(copy.length, first.length[edge], atol=1e-9)
+    ends = {tuple(sorted(pair)) for pair in first.vertex_ids[first.ends[chosen]].tolist()}
+    found = copies.found_for(copy)
+    assert {tuple(sorted(pair)) for pair in order[copy.vertex_ids[copy.ends[found]]].tolist()} == ends
+    assert copies.of(component_of(W + 1e-3 * np.eye(len(V), 3), F)) is None
+    assert copies.of(replace(copy, cost=2 * copy.cost)) is None
+    assert copies.of(replace(copy, avoid=copy.avoid + (np.arange(len(V)) == 3))) is None
+
+
+def test_parts_that_are_turned_are_searched_once(monkeypatch):
+    V, F = meshes.icosphere(2)
+    V = V * [1, 1.3, 1.7] + 0.1 * np.column_stack([V[:, 1] ** 2, V[:, 2] ** 2, V[:, 0] ** 2])
+    searched, search_one = [], SeamSearch._searched
+    parts = [(turned_by(V, k, (-1.0) ** k) + [5 * k, 0, 0], F if k % 2 == 0 else F[:, ::-1]) for k in range(4)]
+    points, faces = union(*parts)
+
+    def counted(self, component, base):
+        searched.append(component)
+        return (yield from search_one(self, component, base))
+
+    monkeypatch.setattr(SeamSearch, "_searched", counted)
+    surface = triangle_surface(points, faces)
+    search = SeamSearch(np.full(len(faces), 0.02), surface, lambda: seam_costs(surface))
+    edges = cut(surface, search=search).edges
+    assert len(searched) == 1
+    each = [np.sort(edges[edges[:, 0] // len(V) == k] % len(V), axis=1) for k in range(4)]
+    assert all(np.array_equal(np.unique(each[0], axis=0), np.unique(other, axis=0)) for other in each)
+    assert len(each[0]) and [found.is_copy for found in search.memory.values()] == [False, True, True, True]
 
 
 def test_neither_order_nor_diagonals_move_a_seam():

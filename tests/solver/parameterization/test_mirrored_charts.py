@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -19,12 +21,13 @@ from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import (
     images_of_cuts,
     motion_between,
+    remembered,
     with_images,
     with_missing_images,
 )
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import predicted_cuts, unwrap
-from omt_uv.solver.progress import drain
+from omt_uv.solver.progress import Progress, drain
 
 DRAFT = UnwrapOptions(quality="draft")
 
@@ -234,3 +237,18 @@ def test_charts_with_a_mirror_of_all_or_of_nothing_miss_no_images():
     for body in (wavy_quads()[:2], (V + 0.05 * np.sin(5 * V + 1), Q.tolist())):
         (chart,) = strict_charts(meshes.polygon_surface(*body, []))
         assert with_missing_images(chart) is None
+
+
+def test_what_was_refined_is_told_again_for_the_same_map():
+    _, (chart,) = charts_of(wavy_quads()[:2])
+    made = []
+
+    def refined(chart, chart_map):
+        made.append(chart_map)
+        yield Progress("Map", 0.0)
+        return chart_map.uv + 1
+
+    again, first = remembered(refined), SimpleNamespace(uv=chart.vertices[:, :2])
+    for chart_map in (first, SimpleNamespace(uv=first.uv.copy()), SimpleNamespace(uv=2 * first.uv)):
+        np.testing.assert_array_equal(drain(again(chart, chart_map)), chart_map.uv + 1)
+    assert len(made) == 2

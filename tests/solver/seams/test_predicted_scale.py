@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from omt_uv.solver.seams.predicted_scale import _inverse
+from omt_uv.solver.seams.predicted_scale import Held, _inverse
 
 
 def test_a_plate_that_rounding_makes_singular_has_an_answer():
@@ -13,3 +13,16 @@ def test_a_plate_that_rounding_makes_singular_has_an_answer():
     assert np.isfinite(green).all() and (green == green.T).all()
     assert abs(green[3, 3] - 0.5) < 1e-8
     assert not green[2].any()
+
+
+def test_what_is_held_one_after_another_is_held_at_once():
+    """To the digits that rounding leaves, where what holds it against rounding is what it was before any."""
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(30, 30))
+    held = Held.of(root @ root.T, rng.normal(size=30))
+    first, then = np.arange(3, 9), np.arange(12, 20)
+    once = held.at(np.concatenate([first, then]))
+    after = held.at(first).at(then, held.own(then))
+    np.testing.assert_allclose(after.value, once.value, atol=1e-10)
+    np.testing.assert_allclose(after.own(np.arange(30)), once.own(np.arange(30)), atol=1e-9)
+    assert np.abs(once.value[np.concatenate([first, then])]).max() < 1e-4
