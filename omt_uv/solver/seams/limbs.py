@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 from ..analysis.symmetry_plane import MirrorImages
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
-from ..mesh.geometry import edge_lengths, face_areas, signed_areas
+from ..mesh.geometry import edge_lengths, face_areas
 from ..mesh.topology import pair_keys
 from ..packing.pack_square import pack
 from ..progress import drain
@@ -30,8 +30,8 @@ from .parting import (
     with_images,
 )
 
-# Charts that have not this share of a surface stay in one piece.
-MOSTLY = 0.5
+# Charts that have not this share of a surface stay in one piece, but for bands.
+MUCH = 0.25
 # A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
 # length or whatever it is, is a band, cut across in so many times as long pieces, at most so many. A narrow one with
 # less than this share of the area is one from COMPACT on: all others would be small for its sake.
@@ -45,10 +45,10 @@ MOST_PIECES = 12
 NEAR_CUT = 0.2
 # What is up in space, (3,); None where nobody knows.
 Up = Sequence[float] | None
-# A chart that fills less of the square around it sprawls; cuts are made where the pieces fill so many times as much
-# once they are packed, which is tried where their boxes promise so many times as much.
-SPRAWLING = 0.3
-FULLER = 1.4
+# A chart sprawls where the whole surface fills less of the square around that chart; cuts are made where the pieces
+# fill so many times as much once they are packed, which is tried where their boxes promise so many times as much.
+SPRAWLING = 0.34
+FULLER = 1.3
 HOPEFUL = 1.25
 # What fills as much needs no further cut; one that is made fills more by this factor at least.
 FULL = 0.45
@@ -84,7 +84,7 @@ def pieces_of_chart(
 def may_come_apart(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
     """Whether `pieces_of_chart` looks for pieces at all, which needs no costs: these may take longer than all else."""
     share = face_areas(chart.vertices, chart.triangles).sum() / whole
-    return _count_of_band(chart, uv, whole) > 1 or bool(share > MOSTLY and sprawls(chart, uv, up))
+    return _count_of_band(chart, uv, whole) > 1 or bool(share > MUCH and sprawls(chart, uv, up, whole))
 
 
 def _count_of_band(chart: Chart, uv: np.ndarray, whole: float) -> int:
@@ -118,12 +118,10 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
     return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 
 
-def sprawls(chart: Chart, uv: np.ndarray, up: Up) -> bool:
-    """Whether the map uv (n,2) of a chart, turned so that `up` (3,) of space is up, fills little of a square; where
-    nobody knows what is up, turned so that a box around it is smallest."""
-    upright = _laid([chart], [uv], up)[0]
-    area = np.abs(signed_areas(uv, chart.triangles)).sum()
-    return bool(area < SPRAWLING * np.ptp(upright, axis=0).max() ** 2)
+def sprawls(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
+    """Whether the map uv (n,2) of a chart, turned so that `up` (3,) of space is up, leaves most of a square empty that
+    holds all, of an area `whole`; where nobody knows what is up, turned so that a box around it is smallest."""
+    return bool(whole < SPRAWLING * np.ptp(_laid([chart], [uv], up)[0], axis=0).max() ** 2)
 
 
 def without_limbs(

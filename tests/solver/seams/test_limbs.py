@@ -17,7 +17,7 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import limbs
-from omt_uv.solver.seams.limbs import FULLER, LEAST_LIMB, sprawls, without_limbs
+from omt_uv.solver.seams.limbs import FULLER, LEAST_LIMB, MUCH, SPRAWLING, may_come_apart, sprawls, without_limbs
 
 UP = (0.0, 0.0, 1.0)
 
@@ -37,9 +37,13 @@ def cross(length=14, width=3, lean=(0, 0)):
     return surface, chart, flat[chart.vertex_ids]
 
 
+def area_of(chart):
+    return float(face_areas(chart.vertices, chart.triangles).sum())
+
+
 def test_a_cross_loses_arms_across_the_shortest_edges():
     surface, chart, uv = cross()
-    assert sprawls(chart, uv, UP)
+    assert sprawls(chart, uv, UP, area_of(chart))
     piece, edges = without_limbs(chart, uv, np.ones(len(uv)), UP)
     area = np.bincount(piece, face_areas(chart.vertices, chart.triangles))
     assert 2 <= len(area) <= 5 and area.min() >= LEAST_LIMB * area.sum() / 2
@@ -49,6 +53,21 @@ def test_a_cross_loses_arms_across_the_shortest_edges():
     assert sorted(len(c.triangles) for c in apart) == sorted(np.bincount(piece).tolist())
     boxes = [np.ptp(uv[chart.triangles[piece == k]].reshape(-1, 2), axis=0) for k in range(len(area))]
     assert sum(a * b for a, b in boxes) * FULLER < np.prod(np.ptp(uv, axis=0))
+
+
+def test_a_part_that_keeps_all_else_small_may_come_apart():
+    """As long as it is much of the whole, and a square around it would be empty for most of it, whatever is beside."""
+    _, chart, uv = cross(length=30)
+    own, square = area_of(chart), np.ptp(uv, axis=0).max() ** 2
+    most = min(SPRAWLING * square, own / MUCH)
+    assert 2 * own < most < SPRAWLING * square * 1.001
+    assert may_come_apart(chart, uv, UP, own) and may_come_apart(chart, uv, UP, 0.999 * most)
+    assert not may_come_apart(chart, uv, UP, 1.001 * most)
+    # Little of a large whole stays as it is, however long.
+    _, chart, uv = cross(length=60)
+    own, square = area_of(chart), np.ptp(uv, axis=0).max() ** 2
+    assert own / MUCH < SPRAWLING * square
+    assert may_come_apart(chart, uv, UP, 0.999 * own / MUCH) and not may_come_apart(chart, uv, UP, 1.001 * own / MUCH)
 
 
 def test_what_is_dear_is_not_cut():
@@ -98,7 +117,7 @@ def test_what_is_compact_stays_whole():
     V, F = meshes.grid(12, 10)
     (chart,) = strict_charts(triangle_surface(V, F))
     uv = chart.vertices[:, :2]
-    assert not sprawls(chart, uv, UP)
+    assert not sprawls(chart, uv, UP, area_of(chart))
     piece, edges = without_limbs(chart, uv, np.ones(len(uv)), UP)
     assert not piece.any() and not len(edges)
 
@@ -175,5 +194,5 @@ def test_where_nobody_knows_what_is_up_the_turn_of_a_map_plays_no_part(angle):
     _, chart, uv = bars()
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     given, turned = (without_limbs(chart, flat, np.ones(len(uv)), None) for flat in (uv, uv @ turn))
-    assert len(given[1]) and sprawls(chart, uv, None) == sprawls(chart, uv @ turn, None)
+    assert len(given[1]) and sprawls(chart, uv, None, area_of(chart)) == sprawls(chart, uv @ turn, None, area_of(chart))
     np.testing.assert_array_equal(*(np.unique(np.sort(edges, axis=1), axis=0) for _, edges in (given, turned)))
