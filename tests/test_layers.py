@@ -36,7 +36,9 @@ ARROWS: dict[str, str] = {
     "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
-    "solver.cutting": "solver solver.mesh solver.linalg solver.quads solver.analysis solver.maps solver.conformal",
+    "solver.revolution": "solver solver.mesh solver.linalg",
+    "solver.cutting": "solver solver.mesh solver.linalg solver.quads solver.analysis solver.maps solver.conformal "
+    "solver.revolution",
     "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.packing solver.cutting",
     "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",
     "solver.refinement": "solver solver.mesh solver.linalg solver.analysis solver.maps",

@@ -133,25 +133,24 @@ VIEWS = {
 }
 
 
-def made(name):
+def made(body):
     """The body, alone in its scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    return BODIES[name]()
+    return body()
 
 
-def maps_of(name):
+def maps_of(body):
     """The maps of a body by column."""
-    ours = rival_maps.ours(made(name))
-    stretch = rival_maps.blender_unwrap(made(name), ours.cut, "Minimum Stretch 50")
-    return {"smart": rival_maps.smart_project(made(name)), "stretch": stretch, "ours": ours}
+    ours = rival_maps.ours(made(body))
+    stretch = rival_maps.blender_unwrap(made(body), ours.cut, "Minimum Stretch 50")
+    return {"smart": rival_maps.smart_project(made(body)), "stretch": stretch, "ours": ours}
 
 
-def main():
-    """Map, draw, and write the plate."""
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/pictures/hard.png"
-    maps = {name: maps_of(name) for name in BODIES}
-    compare.draw_bodies(path, COLUMNS, maps, VIEWS, CELLS, PIXELS)
+def draw(bodies, views, default):
+    """Map bodies, draw them, and write the plate to what the command names, or else to a default."""
+    path = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / default
+    compare.draw_bodies(path, COLUMNS, {name: maps_of(body) for name, body in bodies.items()}, views, CELLS, PIXELS)
 
 
 if __name__ == "__main__":
-    main()
+    draw(BODIES, VIEWS, "docs/pictures/hard.png")

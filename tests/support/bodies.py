@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 
@@ -74,3 +76,22 @@ def hourglass(rings: int, sectors: int) -> tuple[np.ndarray, np.ndarray]:
         F += [np.column_stack([low + k, low + after, up + k]), np.column_stack([low + after, up + after, up + k])]
     top = (rings - 1) * sectors
     return V, np.concatenate([*F, np.column_stack([top + k, top + after, 0 * k + len(V) - 1])])
+
+
+def turned(profile, sides: int) -> tuple[np.ndarray, list[list[int]]]:
+    """Positions (n,3) and polygons of a surface of revolution about z: quads between rows, triangles around poles.
+
+    profile (k,2) : distance from the axis, 0 at poles, and height
+    """
+    turn = 2 * np.pi * np.arange(sides) / sides
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    V, rows = [], []
+    for r, z in profile:
+        points = np.column_stack([r * around, np.full(sides, z)]) if r > 0 else np.array([[0.0, 0.0, z]])
+        rows.append(np.arange(len(points)).repeat(sides // len(points)) + sum(map(len, V)))
+        V.append(points)
+    polygons = []
+    for low, high in pairwise(rows):
+        quads = np.stack([low, np.roll(low, -1), np.roll(high, -1), high], axis=1)
+        polygons += [list(dict.fromkeys(quad)) for quad in quads.tolist()]
+    return np.concatenate(V), polygons

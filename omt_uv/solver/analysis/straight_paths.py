@@ -147,6 +147,9 @@ def _path(network: EdgeNetwork, path: np.ndarray, blocked: np.ndarray, turn: flo
     graph = csr_matrix((np.append(price, network.price[edge[enter]]), (rows, columns)), shape=(states + 1,) * 2)
     distance, before = dijkstra(graph, indices=states, return_predecessors=True)
     last = np.flatnonzero(head == path[-1])
+    if not len(last):
+        # Nothing near leads there: the given one goes across a face.
+        return path
     return _walked(path, tail, before, int(last[distance[last].argmin()]))
 
 

@@ -20,7 +20,7 @@ from ..mesh.geometry import (
     laplacian_from_lengths,
 )
 from ..mesh.gluing import Gluing, groups
-from ..mesh.topology import first_places, halfedges, pair_keys
+from ..mesh.topology import first_places, graph_components, halfedges, pair_keys
 from ..quads.recombination import with_shorter_diagonals
 from .component_order import Outlined, in_order, motion
 
@@ -356,6 +356,10 @@ class SideFinder(Protocol):
     def borders(self) -> tuple[TurnedCopies, TurnedCopies]:
         """Components and where they come apart, not as drawn and as drawn, which are added to."""
 
+    @property
+    def asked(self) -> float:
+        """The square of log(shear) that maps may have; 0 where nobody asks."""
+
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
@@ -372,3 +376,12 @@ def _relative(component: CutComponent) -> list[np.ndarray]:
     p = component.positions - component.positions.min(axis=0)
     size = float(p.max()) or 1.0
     return [p / size, np.where(np.isfinite(component.cost), component.cost / size, -1)]
+
+
+def lone_edges(component: CutComponent, cut: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of a cut (e,) bool that touch no other of it, nor the boundary: these open nothing."""
+    ends = component.ends[cut]
+    label = graph_components(ends[:, 0], ends[:, 1], component.vertex_count)[1][ends[:, 0]]
+    lone = np.zeros(len(cut), dtype=bool)
+    lone[cut] = (np.bincount(label)[label] == 1) & ~component.on_boundary()[ends].any(axis=1)
+    return lone

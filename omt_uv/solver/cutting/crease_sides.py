@@ -18,7 +18,9 @@ from ..mesh.geometry import cross3, face_areas, lengths
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
-from .component import SMOOTH, CutComponent, SideFinder, make_component, with_quads
+from ..revolution.axis import has_axis
+from ..revolution.rings import rings_of_edges
+from .component import SMOOTH, CutComponent, SideFinder, lone_edges, make_component, with_quads
 from .cut_graph import cut_classes
 from .developable_nets import BENT, HARD, MUCH, defects, net
 from .gluing_facts import cost_factors, diagonal_pairs, marked_triangles
@@ -90,7 +92,8 @@ SPECK = 3e-5
 def hard_borders(
     surface: Surface, gluing: Gluing, positions: np.ndarray, gone: np.ndarray, search: SideFinder
 ) -> np.ndarray:
-    """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which bodies of hard sides come apart.
+    """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which bodies of hard sides come apart,
+    and bodies of revolution.
 
     Bodies with a net that is short enough and lies beside itself, and those that are not searched, stay whole;
     positions (n,3) in a unit box
@@ -99,40 +102,46 @@ def hard_borders(
     component_of, classes = components(left), corner_classes(left)
     fold = np.abs(fold_angles(positions, left.vertex[left.triangles], np.stack([left.first, left.second], axis=1)))
     area = np.bincount(component_of, face_areas(positions, left.vertex[left.triangles]))
-    creased = np.unique(component_of[left.first[fold > SMOOTH] // 3])
-    creased = creased[area[creased] >= VISIBLE * area.sum()]
-    if not len(creased):
-        return found
+    creased = np.bincount(component_of[left.first[fold > SMOOTH] // 3], minlength=len(area)) > 0
     marked = np.unique(component_of[marked_triangles(surface, left)])
     free, factor, members = np.zeros(len(positions)), cost_factors(surface, left), groups(component_of)
     pairs = groups(np.append(component_of[left.first // 3], np.arange(len(members))))
     known = search.borders[int(search.as_drawn)]
     diagonals = cache(lambda: diagonal_pairs(left, positions, factor))
-    for k in creased:
-        if not search.wants(left.owner[members[k]], bool(np.isin(k, marked))):
+    for k in np.flatnonzero(area >= VISIBLE * area.sum()):
+        corners, owner = left.vertex[left.triangles[members[k]]], left.owner[members[k]]
+        if not search.wants(owner, bool(np.isin(k, marked))):
+            continue
+        turns = search.asked > 0 and has_axis(positions, corners, owner)
+        if not (creased[k] or turns):
             continue
         component = make_component(left, positions, classes, members[k], pairs[k][pairs[k] < len(number)], free, factor)
         edges = known.found_for(component)
         if edges is None:
-            edges = _borders(component, None if search.as_drawn else diagonals)
+            edges = _borders(component, creased[k], turns * search.asked, None if search.as_drawn else diagonals)
             known.tell(component, edges)
         found[number[component.gluing_pair[edges]]] = True
     return found
 
 
-def _borders(component: CutComponent, diagonals: Callable[[], np.ndarray] | None) -> np.ndarray:
-    """Edges (e,) bool along which a component comes apart; diagonals : gives pairs (p,) bool of the gluing that are
-    those of quads it was triangulated from, None where its creases count as they are."""
-    sides = hard_sides(component, diagonals is None)
+def _borders(
+    component: CutComponent, creased: bool, asked: float, diagonals: Callable[[], np.ndarray] | None
+) -> np.ndarray:
+    """Edges (e,) bool along which a component comes apart; asked : see `rings.rings_of_edges`, 0 of what has no axis;
+    diagonals : gives pairs (p,) bool of the gluing that are those of quads it was triangulated from, None where its
+    creases, if it is creased, count as they are."""
+    sides = hard_sides(component, diagonals is None) if creased else None
     if sides is not None and diagonals is not None:
         # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
         diagonal = diagonals()[component.gluing_pair]
         if diagonal.any():
             component = with_quads(component, diagonal)
             sides = hard_sides(component)
-    if sides is None:
-        return cap_borders(component)
-    return np.zeros(len(component.pair), bool) if _has_clear_net(component) else side_borders(component, *sides)
+    if sides is not None:
+        return np.zeros(len(component.pair), bool) if _has_clear_net(component) else side_borders(component, *sides)
+    given = component.positions, component.triangles, component.polygons, component.pair, component.length
+    around = rings_of_edges(*given, component.cost, asked) if asked else np.zeros(len(component.pair), dtype=bool)
+    return around if around.any() or not creased else cap_borders(component)
 
 
 def cap_borders(component: CutComponent) -> np.ndarray:
@@ -359,15 +368,6 @@ def _disks(component: CutComponent, border: np.ndarray, group: np.ndarray, count
     inner = group[component.pair[~border, 0] // 3]
     vertices, edges, faces = (np.bincount(x, minlength=count) for x in (group[first // 3], inner, group))
     return vertices + edges - 2 * faces == 1
-
-
-def lone_edges(component: CutComponent, cut: np.ndarray) -> np.ndarray:
-    """Edges (e,) bool of a cut (e,) bool that touch no other of it, nor the boundary: these open nothing."""
-    ends = component.ends[cut]
-    label = graph_components(ends[:, 0], ends[:, 1], component.vertex_count)[1][ends[:, 0]]
-    lone = np.zeros(len(cut), dtype=bool)
-    lone[cut] = (np.bincount(label)[label] == 1) & ~component.on_boundary()[ends].any(axis=1)
-    return lone
 
 
 def _inner_curvature(

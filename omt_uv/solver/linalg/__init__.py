@@ -12,6 +12,7 @@ __getattr__, __all__ = lazy(
     additive_schwarz="AdditiveSchwarz schwarz_solver",
     kept_factor="KeptFactor",
     lbfgs="LBFGS",
+    minimum_cut="capacities least_cut",
     multigrid="LaplacianSolver Multigrid",
     nested_dissection="Dissection kd_parts mesh_order vertex_graph",
     symmetric_sweeps="SymmetricSweeps sweeping_solver",

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..analysis.symmetry_plane import MirrorImages
 from ..cutting.crease_sides import COVERED, SHARED
 from ..cutting.developable_nets import HARD
+from ..linalg.minimum_cut import capacities, least_cut
 from ..maps.development import developed
 from ..maps.overlap import cover_pairs, covered_share
 from ..mesh.charts import Chart
@@ -59,9 +60,6 @@ LEAST_SIDE = 0.05
 MOSTLY = 0.4
 # An outline is sharp with this share of it.
 MOSTLY_SHARP = 0.5
-# Capacities are whole numbers: that of an edge of mean cost, and the greatest.
-MEAN_CAPACITY = 10_000
-MOST_CAPACITY = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -354,12 +352,6 @@ def slits(
     return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
 
 
-def capacities(price: np.ndarray) -> np.ndarray:
-    """Prices (e,) of edges in whole numbers."""
-    mean = max(float(price.mean()), 1e-300) if len(price) else 1.0
-    return np.clip(np.round(MEAN_CAPACITY * price / mean), 1, MOST_CAPACITY).astype(np.int32)
-
-
 def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:
     """The mirror image (n,) of every vertex of a chart in it, -1 where there is none."""
     if image is None:
@@ -419,22 +411,4 @@ def _enlarged(
 
 def minimum_cut(graph: PolygonGraph, capacity: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Which polygons (p,) bool are on the side of `one` (a,) of the cheapest cut between these and `other` (b,)."""
-    # What lies at either end is one: nothing is cut within, and it is most of the chart.
-    source, sink = 0, 1
-    inner = np.ones(len(graph.area), dtype=bool)
-    inner[one] = inner[other] = False
-    number = np.full(len(inner), sink)
-    number[one], number[inner] = source, np.arange(2, 2 + np.count_nonzero(inner))
-    tail, head = number[np.concatenate([graph.joined, graph.joined[:, ::-1]])].T
-    onwards = (tail != head) & (head != source) & (tail != sink)
-    # Between the ends everything is cut.
-    onwards &= (tail != source) | (head != sink)
-    count = 2 + int(np.count_nonzero(inner))
-    room = np.tile(capacity, 2)[onwards]
-    pipes = csr_matrix((room, (tail[onwards], head[onwards])), shape=(count, count), dtype=np.int32)
-    left = pipes - maximum_flow(pipes, source, sink).flow
-    left.data = np.maximum(left.data, 0)
-    left.eliminate_zeros()
-    side = np.zeros(count, dtype=bool)
-    side[breadth_first_order(left, source, return_predecessors=False)] = True
-    return side[number]
+    return least_cut(graph.joined, capacity, len(graph.area), one, other)

@@ -12,6 +12,7 @@ from scipy.sparse import csr_matrix
 from short_cuts import component_of
 
 from omt_uv.solver.analysis.symmetry_plane import MirrorImages
+from omt_uv.solver.linalg.minimum_cut import capacities
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -107,7 +108,7 @@ def test_the_minimum_cut_is_the_cheapest_of_all():
     assert count <= 18
     rng = np.random.default_rng(0)
     for _ in range(3):
-        capacity = parting.capacities(rng.uniform(0.1, 3, len(graph.joined)))
+        capacity = capacities(rng.uniform(0.1, 3, len(graph.joined)))
         one, other = np.array([0, 1]), np.array([count - 1])
         side = parting.minimum_cut(graph, capacity, one, other)
         assert side[one].all() and not side[other].any()
@@ -119,17 +120,6 @@ def test_the_minimum_cut_is_the_cheapest_of_all():
             trial[free] = choice
             best = min(best, capacity[trial[graph.joined[:, 0]] != trial[graph.joined[:, 1]]].sum())
         assert capacity[side[graph.joined[:, 0]] != side[graph.joined[:, 1]]].sum() == best
-
-
-def test_capacities_are_prices_in_whole_numbers():
-    price = np.array([1.0, 2.0, 3.0, 0.0, 1e9])
-    found = parting.capacities(price[:4])
-    assert found.tolist() == [6667, 13333, 20000, 1] and found.dtype == np.int32
-    assert (
-        parting.capacities(price).max() == 50_000
-        and parting.capacities(1e-3 * price).tolist() == parting.capacities(price).tolist()
-    )
-    assert parting.capacities(np.append(np.zeros(4999), 1.0)).max() == 10_000_000
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.4, 2.0])
