@@ -133,11 +133,12 @@ def front_modules() -> list:
     ]
 
 
-def _public(module) -> Iterator[tuple[str, Any, str, Callable]]:
-    """Names, owners, attributes and functions of a module: public functions, and public methods of its classes."""
+def _public(module, private: bool = False) -> Iterator[tuple[str, Any, str, Callable]]:
+    """Names, owners, attributes and functions of a module: public functions, and public methods of its classes;
+    private ones, too, if asked for, but for those that Python calls by itself."""
     short = module.__name__.removeprefix(solver.__name__ + ".").removeprefix(omt_uv.__name__ + ".")
     for name, value in sorted(vars(module).items()):
-        if getattr(value, "__module__", "") != module.__name__ or name.startswith("_"):
+        if getattr(value, "__module__", "") != module.__name__ or (name.startswith("_") and not private):
             continue
         if inspect.isfunction(value):
             yield f"{short}.{name}", None, name, value
@@ -145,7 +146,8 @@ def _public(module) -> Iterator[tuple[str, Any, str, Callable]]:
             for method, found in sorted(vars(value).items()):
                 if method in CALLED_BY_BLENDER:
                     continue
-                if inspect.isfunction(found) and (not method.startswith("_") or method == "__call__"):
+                told = not method.startswith("__") if private else not method.startswith("_")
+                if inspect.isfunction(found) and (told or method == "__call__"):
                     yield f"{short}.{name}.{method}", value, method, found
 
 
@@ -281,12 +283,13 @@ def recorded(most: int = 1) -> Iterator[Record]:
 
 
 @contextmanager
-def watching(record: Record, everything: list) -> Iterator[None]:
-    """A context in which a record hears of all calls of public functions and methods of modules."""
+def watching(record: Record, everything: list, private: bool = False) -> Iterator[None]:
+    """A context in which a record hears of all calls of public functions and methods of modules, or of private ones,
+    too."""
     before, watched = [], {}
     forget(everything)
     for module in everything:
-        for name, owner, attribute, function in _public(module):
+        for name, owner, attribute, function in _public(module, private):
             if owner is None:
                 watched[function] = _watched(record, name, function, False)
             else:

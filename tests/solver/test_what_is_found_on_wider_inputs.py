@@ -1,0 +1,118 @@
+"""What every function of the solver finds, private ones, too, on meshes of more kinds and sizes than `solver_runs` has.
+
+As `test_what_holds_of_every_function`, whose table has public functions on small meshes alone: `found_wider.tsv` has
+three figures of what each function finds in its first calls of every run of `wider_runs`, and of private ones in those
+of `solver_runs`. So a bound or a weight within a function, and a branch that is taken from a size on, is seen by what
+it changes. OMT_UV_ACCEPT=1 writes the table anew, without what the last digits of the input decide;
+OMT_UV_ACCEPT=fewer leaves out what does not hold here, to be called once with every OPENBLAS_CORETYPE.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import types
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import meshes
+import numpy as np
+import recorded_calls
+import solver_runs
+import wider_runs
+
+from omt_uv import solver
+
+FOUND = Path(__file__).with_name("found_wider.tsv")
+ACCEPT = os.environ.get("OMT_UV_ACCEPT", "")
+# Calls of each function in a run whose figures are kept.
+MOST = 6
+# Runs of `solver_runs` that take longest, and find by private functions what public ones tell.
+LEFT_OUT = ("compared", "new_meshes")
+# What stands behind names of private functions in runs of `solver_runs`.
+SMALL = " on small meshes"
+# Least share of the functions of the solver that are to be seen.
+MOST_OF_ALL = 0.85
+
+
+def told():
+    """Figures of what functions give in all runs, by their names."""
+    record = recorded_calls.Told(MOST)
+    everything = [*recorded_calls.modules(), solver]
+    with recorded_calls.watching(record, everything, private=True), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name, run in wider_runs.RUNS.items():
+            record.next_run(wider_runs.MARKS.get(name, ""))
+            run()
+        for name, run in solver_runs.RUNS.items():
+            if name not in LEFT_OUT:
+                record.next_run(SMALL + " of symmetric meshes" * (name in ("with_symmetry", "bodies_cut_open")))
+                run()
+    return record.figures
+
+
+def _shaken(seed, value):
+    """A mesh (positions first), or a surface, whose positions differ in the tenth digit, by where they are alone."""
+    if hasattr(value, "positions"):
+        return replace(value, positions=_moved(seed, value.positions))
+    if isinstance(value, tuple):
+        return (_shaken(seed, value[0]), *value[1:])
+    return _moved(seed, value)
+
+
+def _moved(seed, V):
+    V = np.asarray(V, float)
+    with np.errstate(all="ignore"):
+        return V * (1 + 1e-10 * np.sin(7 * V.sum(axis=1, keepdims=True) + seed))
+
+
+def _shaking(seed, function):
+    return lambda *given, **more: _shaken(seed, function(*given, **more))
+
+
+def shaken(seed, monkeypatch):
+    """Figures of the same runs on meshes that differ in the tenth digit."""
+    with monkeypatch.context() as patch:
+        for module, names in (
+            (wider_runs, ("bent", "curved", "wavy_quads", "wavy_mixed", "with_limbs", "broken_mesh")),
+            (solver_runs, ("patch", "body")),
+        ):
+            for name in names:
+                patch.setattr(module, name, _shaking(seed, getattr(module, name)))
+        names = ("two_bumps", "torus", "polar", "icosphere")
+        others = {name: _shaking(seed, getattr(meshes, name)) for name in names}
+        patch.setattr(wider_runs, "meshes", types.SimpleNamespace(**{**vars(meshes), **others}))
+        for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
+            cached.cache_clear()
+        figures = told()
+    for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
+        cached.cache_clear()
+    return figures
+
+
+@functools.cache
+def rows():
+    return told()
+
+
+def test_nearly_all_functions_are_seen():
+    names = {name for module in recorded_calls.modules() for name, *_ in recorded_calls._public(module, private=True)}
+    seen = {name.partition(" ")[0] for name in rows()}
+    missing = sorted(names - seen)
+    assert len(missing) < (1 - MOST_OF_ALL) * len(names), (len(names), missing)
+
+
+def test_what_is_found_on_wider_inputs_is_that_of_the_table(monkeypatch):
+    # Public functions on small meshes have a table of their own.
+    here = {name: row for name, row in rows().items() if SMALL not in name or "._" in name}
+    if ACCEPT == "1":
+        lines = recorded_calls.lines_of(here, [shaken(seed, monkeypatch) for seed in (1, 2, 3)])
+        FOUND.write_text("".join(f"{line}\n" for line in lines))
+    lines = FOUND.read_text().splitlines()
+    other = list(recorded_calls.unlike(lines, here))
+    if ACCEPT == "fewer":
+        FOUND.write_text("".join(f"{line}\n" for line in lines if line not in other))
+        return
+    now = [f"{line} is now {here.get(line.split(chr(9))[0])}" for line in other]
+    assert not other, "\n".join([*now, "OMT_UV_ACCEPT=1 accepts this"])
