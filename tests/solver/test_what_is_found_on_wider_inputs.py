@@ -36,8 +36,15 @@ SMALL = " on small meshes"
 MOST_OF_ALL = 0.85
 
 
+def _forget():
+    """Meshes that `solver_runs` has made for other tests are made again, and seen."""
+    for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
+        cached.cache_clear()
+
+
 def told():
     """Figures of what functions give in all runs, by their names."""
+    _forget()
     record = recorded_calls.Told(MOST)
     everything = [*recorded_calls.modules(), solver]
     with recorded_calls.watching(record, everything, private=True), warnings.catch_warnings():
@@ -83,11 +90,8 @@ def shaken(seed, monkeypatch):
         names = ("two_bumps", "torus", "polar", "icosphere")
         others = {name: _shaking(seed, getattr(meshes, name)) for name in names}
         patch.setattr(wider_runs, "meshes", types.SimpleNamespace(**{**vars(meshes), **others}))
-        for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
-            cached.cache_clear()
         figures = told()
-    for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
-        cached.cache_clear()
+    _forget()
     return figures
 
 
