@@ -63,3 +63,24 @@ def test_a_preset_that_cannot_be_used_leaves_every_setting_as_it_was(package, tm
     assert {name: (getattr(properties, name), properties.is_property_set(name)) for name in names} == before
     for name in names:
         properties.property_unset(name)
+
+
+REFUSED = {"large": "10**20", "text": "'x'", "list": "[1, 2]", "nothing": "None", "endless": "1e999", "bytes": "b'8'"}
+
+
+@pytest.mark.parametrize("value", REFUSED)
+@pytest.mark.parametrize("was_set", [True, False])
+def test_what_no_property_takes_leaves_all_of_them_as_they_were(value, was_set, package, tmp_path):
+    presets, path = package("session.presets"), tmp_path / "odd.py"
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    properties.property_unset("margin")
+    if was_set:
+        properties.margin = 5
+    number = "100000000000000000000" if value == "large" else REFUSED[value]
+    path.write_text(f"op.balance = 0.25\nop.margin = {number}\n")
+    balance = properties.balance, properties.is_property_set("balance")
+    with pytest.raises(presets.PresetError, match=r"odd\.py cannot be used: .*Choose another one"):
+        presets.choose(path, properties)
+    assert (properties.balance, properties.is_property_set("balance")) == balance
+    assert properties.is_property_set("margin") == was_set and (not was_set or properties.margin == 5)
+    properties.property_unset("margin")

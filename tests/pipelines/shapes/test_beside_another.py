@@ -11,12 +11,16 @@ from readings import together
 from sphere_shapes import blob
 
 from omt_uv.pipelines.shapes import distance, partition, signature_index
+from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, pairs_of
+from omt_uv.pipelines.shapes.match import MatchJob, match_surfaces
 from omt_uv.settings import PartitionSettings
 from omt_uv.solver.errors import LandmarkError
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
+from omt_uv.solver.registration.results import RegistrationOptions
 
 FIRST = [True, False]
+NO_EDGES = np.zeros((0, 2), int)
 POINTS = 40
 
 
@@ -190,3 +194,22 @@ def test_an_index_finds_what_all_others_would_in_any_order_and_no_more_than_aske
             assert [name for name, _ in found] == [name for name, _ in asked[:top]]
             for (_, one), (_, other) in zip(found, asked, strict=False):
                 assert one.raw == pytest.approx(other.raw, abs=2e-3)
+
+
+# ---- matches -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("first", FIRST)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_smaller_part_goes_where_the_body_beside_it_goes(first, seed):
+    """Moved, turned and made larger as that is: so the whole lies where it would if all of it had been matched."""
+    own, eye = body(seed), meshes.icosphere(0)
+    vertices, _, (V, F) = both(own, (0.1 * eye[0] + [1.6, 0.2, 0.3], eye[1]), first)
+    turn = np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])
+    goal = 1.7 * V @ turn.T + [4, -2, 1]
+    points = [LandmarkPoint(str(k), vertex=int(vertices[k])) for k in (3, 40, 90, 120)]
+    at = [LandmarkPoint(str(k), vertex=k) for k in (3, 40, 90, 120)]
+    target = triangle_surface(goal[vertices], own[1])
+    job = MatchJob(triangle_surface(V, F), target, pairs_of(points, at, ("a", "b")), RegistrationOptions(), NO_EDGES)
+    found = drain(match_surfaces(job))
+    assert np.abs(found.wrapped - goal).max() < 0.02

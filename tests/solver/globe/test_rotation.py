@@ -88,3 +88,16 @@ def test_markers_turn_with_the_sphere():
     R = random_rotation(2)
     for given in ((pole, meridian), (pole, meridian, side)):
         np.testing.assert_allclose(by_markers(*(R @ x for x in given)) @ R, by_markers(*given), atol=1e-13)
+
+
+@pytest.mark.parametrize("away, refused", [(0.9e-6, True), (1.1e-6, False)])
+def test_markers_are_a_millionth_of_the_radius_apart_at_least(away, refused):
+    """From the pole, and that they have a middle at all."""
+    near = np.array([away, 0, 1.0])
+    for given in ((np.array([0, 0, 1.0]), near), (np.array([0, 0, 1.0]), np.array([0, -1.0, 0]), near), (away * near,)):
+        if refused:
+            with pytest.raises(MarkerError):
+                by_markers(*given)
+        else:
+            turn = by_markers(*given)
+            np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-9)
