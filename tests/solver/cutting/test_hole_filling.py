@@ -377,3 +377,14 @@ def test_seams_neither_begin_in_the_eyes_of_a_head_nor_lead_there():
     # Where no seams are searched for the shear, holes are joined by the shortest way.
     plain = drain(unwrap(triangle_surface(V, F)))
     assert np.isin(plain.seams, np.concatenate(borders)).any()
+
+
+@pytest.mark.parametrize("side, filled", [(2, 7), (3, 7), (4, 6), (5, 6)])
+def test_a_hole_that_is_thrice_as_long_as_the_middle_one_stays_open(side, filled):
+    """The outline, four squares of one cell, two of four, and one of this side: the middle one has one cell."""
+    V, F = meshes.grid(24, 24, 24.0, 24.0)
+    middle, gone = V[F].mean(axis=1), np.zeros(len(F), bool)
+    for x, y, size in ((2, 2, 1), (2, 6, 1), (6, 2, 1), (6, 6, 1), (10, 2, 2), (2, 10, 2), (13, 13, side)):
+        gone |= (middle[:, 0] > x) & (middle[:, 0] < x + size) & (middle[:, 1] > y) & (middle[:, 1] < y + size)
+    warnings = cut_to_disks(triangle_surface(V, F[~gone]), sieve=3).warnings
+    assert [text.partition(" are filled")[0] for text in warnings] == [f"{filled} holes"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.mesh.topology import pair_keys
+from omt_uv.solver.remeshing.initial import arc_network
 from omt_uv.solver.remeshing.initial.arc_network import chart_boundary, find_arcs, sample_arcs
 from omt_uv.solver.remeshing.initial.component_maps import RemeshSource
 
@@ -75,3 +76,31 @@ def test_samples_around_a_chart_come_in_order_of_its_loop():
             a, b = (V[chart.vertex_ids[loop[i % len(loop)]]] for i in (k, k + 1))
             on = a + (found.place - k)[:, None] * (b - a)
             np.testing.assert_allclose(samples.points[found.samples], on, atol=1e-9)
+
+
+def bend(at, angle, total=10.0):
+    """A line that turns by an angle at a distance from its start: positions (n,3), and distances (n,)."""
+    s = np.unique(np.append(np.linspace(0, total, 201), at))
+    beyond = np.maximum(s - at, 0)
+    along, across = np.minimum(s, at) + beyond * np.cos(angle), beyond * np.sin(angle)
+    return np.column_stack([along, across, 0 * s]), s
+
+
+@pytest.mark.parametrize("degrees, told", [(0, False), (49, False), (51, True), (90, True)])
+def test_a_corner_turns_by_more_than_fifty_degrees(degrees, told):
+    p, s = bend(4.0, np.radians(degrees))
+    found = arc_network._corners(p, np.arange(len(p)), np.ones(len(p)))
+    assert s[found].tolist() == [4.0] * told
+
+
+@pytest.mark.parametrize("at", [0.05, 0.2, 0.4, 0.55, 0.65, 1.0, 5.0])
+def test_no_corner_is_near_either_end_of_a_line(at):
+    """Nearer than 0.6 of an edge, whichever end it begins at."""
+    for size in (1.0, 0.5):
+        p, s = bend(at, np.pi / 2)
+        ahead = s[arc_network._corners(p, np.arange(len(p)), np.full(len(p), size))]
+        back = s[arc_network._corners(p, np.arange(len(p))[::-1], np.full(len(p), size))]
+        for found in (ahead, back):
+            assert (np.minimum(found, s[-1] - found) > 0.6 * size).all()
+            if at > 0.6 * size:
+                assert found.tolist() == [at]
