@@ -218,3 +218,17 @@ def test_memory_is_what_the_system_says(package, monkeypatch, tmp_path, text, ex
     if text is not None:
         (tmp_path / "status").write_text(text)
     assert serve._memory() == expected
+
+
+@pytest.mark.parametrize(
+    "words, program", [(["blender", "-b", "--command", "omt_uv", "unwrap"], True), (["blender"], False)]
+)
+def test_a_second_blender_gets_the_words_that_started_this_one(words, program, package, monkeypatch):
+    import bpy
+
+    asked, cli = [], package("cli")
+    monkeypatch.setattr(cli, "main", lambda given: asked.append(given) or 3)
+    monkeypatch.setattr(cli, "program", lambda given, start: asked.append((given, start)) or 4)
+    monkeypatch.setattr("sys.argv", words)
+    assert package("registration")._command(["unwrap"]) == (4 if program else 3)
+    assert asked == [(["unwrap"], [bpy.app.binary_path, *words[1:]]) if program else ["unwrap"]]

@@ -1,9 +1,12 @@
 """Charts refined side by side: each as if it were alone."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.maps.untangle import count_folds
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -106,3 +109,21 @@ def test_a_chart_whose_map_would_cover_itself_is_given_back():
         ramps.append((np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.1 * angle], axis=1), F))
     found = drain(refine_batch(in_unit_box(ramps), "standard", 0.0))
     assert found.solved.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("off", [0.0, 0.8e-9, 1.5e-9, 1e-3])
+@pytest.mark.parametrize("axes", [[1, 1], [1, 0]])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_chart_of_one_size_without_shear_is_isometric_whatever_is_beside_it(off, axes, first):
+    """One of two squares of a chart is larger by that, along both axes alike or along one, which shears it by half of that."""
+    V, F = meshes.quad_patch()
+    pieces = [V[:, :2], V[:, :2] * (1 + off * np.array(axes))]
+    charts = [pieces, [V[:, :2]] * 2] if first else [[V[:, :2]] * 2, pieces]
+    w = np.concatenate([uv for chart in charts for uv in chart]) @ [1, 1j]
+    triangles = np.concatenate([F + k * len(V) for k in range(4)])
+    positions = np.tile(V, (4, 1))
+    union = SimpleNamespace(of_vertex=np.repeat([0, 1], 2 * len(V)), count=2)
+    found = batch_refine._isometric(union, elements(positions, triangles, face_areas(positions, triangles)), w)
+    bad, good = (0, 1) if first else (1, 0)
+    assert found[good]
+    assert found[bad] == (off < (1e-9 if axes == [1, 1] else 2e-9))
