@@ -115,7 +115,7 @@ def test_a_chart_whose_map_would_cover_itself_is_given_back():
 @pytest.mark.parametrize("axes", [[1, 1], [1, 0]])
 @pytest.mark.parametrize("first", [True, False])
 def test_a_chart_of_one_size_without_shear_is_isometric_whatever_is_beside_it(off, axes, first):
-    """One of two squares of a chart is larger by that, along both axes alike or along one, which shears it by half of that."""
+    """One of two squares of a chart is larger by that, along both axes alike, or along one by half of it."""
     V, F = meshes.quad_patch()
     pieces = [V[:, :2], V[:, :2] * (1 + off * np.array(axes))]
     charts = [pieces, [V[:, :2]] * 2] if first else [[V[:, :2]] * 2, pieces]
