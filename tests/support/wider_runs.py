@@ -35,7 +35,7 @@ from omt_uv.solver.packing.single_precision import without_rounded_folds
 from omt_uv.solver.parameterization import chart_map as chart_maps
 from omt_uv.solver.parameterization import convexity, initial_map
 from omt_uv.solver.parameterization.chart_map import map_chart
-from omt_uv.solver.parameterization.options import MapOptions
+from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import refine as refining
@@ -353,16 +353,31 @@ def _pulled_and_magnified():
     drain(volume_registration.registered(0.7 * sphere, 0.5 * sphere[[3, 40, 90]], 0.45 * sphere[[5, 41, 95]]))
 
 
+def _turned_bodies():
+    """Rings of bodies of revolution: in rows, with a face around the axis, open, and noisy as a scan is."""
+    bottle = [(0.8, 0), (0.9, 0.1), (0.9, 1.2), (0.75, 1.6), (0.4, 1.9), (0.3, 2.4), (0.33, 2.5)]
+    V, Q = bodies.turned([(0, 0), *bottle], 13)
+    open_surface, filled = (
+        meshes.polygon_surface(V, Q),
+        meshes.polygon_surface(V[1:], [list(range(13))[::-1]] + [[v - 1 for v in q] for q in Q[13:]]),
+    )
+    V, F = bodies.icosphere(3)
+    scan = meshes.polygon_surface(V * [1, 1, 1.7] + 1e-3 * np.sin(40 * V[:, [1, 2, 0]]), F.tolist())
+    for surface in (open_surface, filled, scan):
+        drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
+
+
 RUNS = {
     function.__name__.strip("_"): function
     for function in (
         _large_charts, _polygons, _by_name, _more_spheres, _remeshed, _matches, _flows_and_creases, _as_if_large,
         _bodies_mapped, _pieces, _pulled_and_magnified, _limbs, _seams_on_a_coarse_surface, _hard_edges,
-        _handles_and_holes, _broken, _mirror_images,
+        _handles_and_holes, _broken, _mirror_images, _turned_bodies,
     )
 }  # fmt: skip
 # Runs whose figures are kept apart: what is searched, broken or symmetric may hang on last digits.
 MARKS = {
     "limbs": " in searches", "seams_on_a_coarse_surface": " in searches", "hard_edges": " in searches",
     "handles_and_holes": " in searches", "broken": " of broken meshes", "mirror_images": " of symmetric meshes",
+    "turned_bodies": " of turned bodies",
 }  # fmt: skip

@@ -13,8 +13,8 @@ WORTH = 2.5
 ISLAND = 0.25
 # A ring where the profile turns by a right angle costs less by this share, and less by part of it for smaller turns.
 CREASE = 0.5
-# A band keeps this share of what is asked for: what is foretold is about right.
-KEPT = 1.0
+# Less than this share of the greatest radius counts as much.
+NEEDLE = 1e-6
 
 
 def cheapest_bands(profile: Profile, price: np.ndarray, asked: float) -> np.ndarray:
@@ -26,7 +26,8 @@ def cheapest_bands(profile: Profile, price: np.ndarray, asked: float) -> np.ndar
     by dynamic programming (Bellman 1957).
     """
     r, s = profile.radius, profile.length
-    step, middle = np.diff(s), (r[1:] + r[:-1]) / 2
+    # A needle has no radius, but no length around it to be off either.
+    step, middle = np.diff(s), np.maximum((r[1:] + r[:-1]) / 2, NEEDLE * r.max())
     area = 2 * np.pi * middle * step
     side = np.sqrt(area.sum())
     apart = _sectors(middle, (s[1:] + s[:-1]) / 2, step)
@@ -88,5 +89,5 @@ def _turns(radius: np.ndarray, length: np.ndarray) -> np.ndarray:
 
 def _cost(left: np.ndarray, share: np.ndarray, asked: float) -> np.ndarray:
     """What bands cost (...,) that are such a share of the surface and have this mean square of log(shear) left."""
-    keeps = left <= KEPT * asked
+    keeps = left <= asked
     return np.where(keeps, WORTH * share * np.where(keeps, left, 0.0) / asked, np.inf)

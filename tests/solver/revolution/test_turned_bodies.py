@@ -14,7 +14,7 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.revolution.axis import PASSES, axis_of_revolution
-from omt_uv.solver.revolution.bands import CREASE, ISLAND, KEPT, WORTH, cheapest_bands
+from omt_uv.solver.revolution.bands import CREASE, ISLAND, WORTH, cheapest_bands
 from omt_uv.solver.revolution.profile import LEAST_SIDES, MOST_LEVELS, Profile, profile_of
 from omt_uv.solver.revolution.rings import rings_of_edges
 
@@ -165,6 +165,14 @@ def test_a_body_comes_apart_where_its_profile_bends():
     assert cheapest_bands(profile(radius[::-1], s, (False, True)), np.ones(31), ASKED).tolist() == [20]
 
 
+def test_a_needle_on_top_is_no_trouble():
+    s = np.array([0, 0.5, 1, 1.5, 2.0, 2.2, 2.5])
+    needle = profile([0.5, 0.5, 0.5, 0.25, 0, 0, 0], s, (False, True))
+    with np.errstate(all="raise"):
+        found = cheapest_bands(needle, np.ones(7), ASKED)
+    assert found.min() > 0 and found.max() < 6 and 3 in found
+
+
 def test_dear_rings_are_left_out_as_long_as_bands_keep_what_is_asked():
     s = np.linspace(0, 2, 41)
     mild = 1 + 0.12 * np.sin(np.pi * s / 2)
@@ -196,7 +204,7 @@ def test_the_cheapest_of_all_choices_is_found():
             basis = np.stack([np.ones(high - low), at[here]], axis=1) * weight[:, None]
             left = middle[here] * weight - basis @ np.linalg.lstsq(basis, middle[here] * weight, rcond=None)[0]
             left = 4 * (left @ left) / (middle[here] @ step[here])
-            if left > KEPT * ASKED:
+            if left > ASKED:
                 return np.inf
             total += WORTH * area[here].sum() / area.sum() * left / ASKED + (s[high] - s[low]) / side
         return total
