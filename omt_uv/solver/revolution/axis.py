@@ -13,6 +13,8 @@ from ..mesh.geometry import cross3, dot3
 PASSES = 0.05
 OTHERS = 4.0
 PASSES_OTHERS = 0.03
+# Of lengths that differ by less, over themselves, rounding chooses none.
+EVEN = 1e-6
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,9 @@ def axis_of_revolution(positions: np.ndarray, triangles: np.ndarray, polygon: np
     shift = np.linalg.pinv(mm, rcond=1e-9, hermitian=True) @ am.T
     least, directions = np.linalg.eigh(aa - am @ shift)
     direction = directions[:, 0]
+    # Either way is as good: the one that goes on along the axis of space that it is nearest to.
+    near = np.abs(direction) >= (1 - EVEN) * np.abs(direction).max()
+    direction = direction * np.sign(direction[near][0])
     move = -shift @ direction
     axis = Axis(centre + np.cross(direction, move), direction)
     passed = dot3(cross3(np.broadcast_to(direction, middle.shape), middle - axis.point), normal)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .axis import EVEN
 from .profile import Profile
 
 # What maps shear by costs this much more than a cut as long as the side of a square with the area, where the mean of
@@ -44,8 +45,9 @@ def cheapest_bands(profile: Profile, price: np.ndarray, asked: float) -> np.ndar
     best[0] = 0.0
     for k in range(1, count):
         ways = best[:k] + cost[:k, k] + np.where(np.arange(k) > 0, ring[:k], 0.0)
-        before[k] = np.argmin(ways)
-        best[k] = ways[before[k]]
+        # Of two that cost the same, as on bodies with two like ends, rounding chooses none.
+        before[k] = np.argmax(ways <= (1 + EVEN) * ways.min())
+        best[k] = ways.min()
     if not np.isfinite(best[-1]):
         return np.zeros(0, np.int64)
     found, k = list[int](), int(before[-1])

@@ -9,7 +9,7 @@ import numpy as np
 from ..linalg.sparse import solve_spd
 from ..mesh.geometry import LEAST_STIFFNESS, face_normals, halfedge_lengths, laplacian_from_lengths
 from ..mesh.topology import graph_components, halfedges, on_boundary
-from .axis import Axis
+from .axis import EVEN, Axis
 
 # Vertices are in rows if there are at least so many in each in the mean: edges join them, and they are at one place of
 # the profile but for this share of its size. With fewer in most of them than the second number a body is a prism. Where
@@ -139,7 +139,13 @@ def _ends(positions: np.ndarray, triangles: np.ndarray, axis: Axis) -> tuple[lis
     poles = _poles(positions, triangles, axis)
     if len(names) + len(poles) != 2:
         return None
-    return [*(np.flatnonzero(loop == k) for k in names), *poles], np.arange(2) >= len(names)
+    found, are_poles = [*(np.flatnonzero(loop == k) for k in names), *poles], np.arange(2) >= len(names)
+    # The numbers of vertices choose no end to begin at.
+    height, radius = (np.array([f(positions[end]).mean() for end in found]) for f in (axis.height, axis.radius))
+    level = abs(height[1] - height[0]) <= EVEN * np.ptp(axis.height(positions))
+    if (radius[0] < radius[1]) if level else (height[0] > height[1]):
+        found, are_poles = found[::-1], are_poles[::-1]
+    return found, are_poles
 
 
 def _poles(positions: np.ndarray, triangles: np.ndarray, axis: Axis) -> list[np.ndarray]:

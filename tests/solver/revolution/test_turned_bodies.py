@@ -23,7 +23,14 @@ ASKED = float(np.log(1.35) ** 2)
 VASE = [(0, 0), (0.3, 0), (0.5, 0), (0.65, 0.25), (0.8, 0.5), (0.88, 0.8), (0.9, 1.1), (0.8, 1.5), (0.6, 1.8)]
 VASE += [(0.45, 2.0), (0.3, 2.2), (0.35, 2.5), (0.5, 2.6)]
 PLATE = [(0, 0), (0.5, 0), (1, 0.2), (1.02, 0.22), (1, 0.24), (0.5, 0.06), (0, 0.06)]
-BODIES = {"vase": VASE, "plate": PLATE, "cone": [(0.5, 0), (0.3, 1), (0.1, 2)], "barrel": [(0.8, 0), (1, 1), (0.8, 2)]}
+COLUMN = [(0.6, 0), (0.55, 0.15), (0.45, 0.3), (0.4, 0.5), (0.4, 2.1), (0.45, 2.3), (0.55, 2.45), (0.6, 2.6)]
+BODIES = {
+    "vase": VASE,
+    "plate": PLATE,
+    "cone": [(0.5, 0), (0.3, 1), (0.1, 2)],
+    "barrel": [(0.8, 0), (1, 1), (0.8, 2)],
+    "column": COLUMN,
+}
 
 
 def somewhere(V, seed=0, size=7.0):
@@ -223,6 +230,21 @@ def test_rings_are_whole_rows_of_edges():
     # Every vertex on one is between two of its edges.
     assert (np.bincount(ends.ravel())[np.unique(ends)] == 2).all()
     assert graph_components(*ends.T, len(V))[0] == len(V) - len(ends) + len(ends) // 24
+
+
+@pytest.mark.parametrize("name", ["column", "vase", "plate"])
+@pytest.mark.parametrize("size", [1.0, 0.37])
+def test_numbers_size_and_place_move_no_ring(name, size):
+    """Of a column both halves are alike: then no order of vertices and triangles, and no rounding, may choose."""
+    V, F, owner = triangulated(name)
+    given = ring_edges(V, F, owner)
+    rng = np.random.default_rng(1)
+    number, order = rng.permutation(len(V)), rng.permutation(len(F))
+    moved = np.empty_like(V)
+    moved[number] = size * V + [0.1, 2, 0.3]
+    found = ring_edges(moved, number[F][order], owner[order])
+    assert len(given)
+    assert {frozenset(edge) for edge in number[given].tolist()} == {frozenset(edge) for edge in found.tolist()}
 
 
 def test_what_is_dear_to_cut_has_no_ring():
