@@ -105,6 +105,7 @@ class Scenes:
             sides.add(any(sentence.fits(text) for text in told))
         assert sides == {True, False}, sides
 
-    def without(self, found: list[Sentence]) -> list[Sentence]:
-        """Sentences that no scene provokes."""
-        return [s for s in found if not any(s.module == m and s.text.startswith(b) for m, b in self.of)]
+    def without(self, found: list[Sentence], reasons: dict[tuple[str, str], str]) -> list[Sentence]:
+        """Sentences that no scene provokes, and that have no reason why not, by module and beginning as well."""
+        known = [*self.of, *reasons]
+        return [s for s in found if not any(s.module == m and s.text.startswith(b) for m, b in known)]

@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull
 
 from ..analysis.symmetry_plane import MirrorImages
+from ..linalg.minimum_cut import capacities
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
 from ..mesh.geometry import edge_lengths, face_areas
@@ -24,7 +25,6 @@ from .options import COMPACT
 from .parting import (
     LEAST_PART,
     PolygonGraph,
-    capacities,
     lies_on_its_image,
     minimum_cut,
     with_images,

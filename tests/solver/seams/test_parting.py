@@ -8,6 +8,7 @@ import pytest
 
 from omt_uv.solver.analysis.symmetry_plane import MirrorImages
 from omt_uv.solver.cutting import cuts
+from omt_uv.solver.linalg.minimum_cut import capacities
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.overlap import cover_pairs, overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
@@ -20,7 +21,6 @@ from omt_uv.solver.seams.parting import (
     LEAST_PART,
     MOST_SLITS,
     PolygonGraph,
-    capacities,
     flat_sides,
     parted,
     slits,
