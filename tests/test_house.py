@@ -60,7 +60,7 @@ UNEVEN = {
     "omt_uv/pipelines/layout.py": (2, STARTS),
     "omt_uv/pipelines/subdivision.py": (3, STARTS),
     "omt_uv/solver/maps/mirror_symmetry.py": (1, "an axis may have no image"),
-    "omt_uv/solver/parameterization/convexity.py": (3, STARTS),
+    "omt_uv/solver/parameterization/polygons/convexity.py": (3, STARTS),
     "omt_uv/solver/parameterization/mirrored_charts.py": (1, STARTS),
     "omt_uv/solver/signatures/membrane.py": (1, STARTS),
 }

@@ -43,8 +43,11 @@ ARROWS: dict[str, str] = {
     "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",
     "solver.refinement": "solver solver.mesh solver.linalg solver.analysis solver.maps",
     "solver.subdivision": "solver solver.mesh solver.maps solver.refinement",
+    "solver.parameterization.polygons": "solver solver.mesh solver.linalg solver.quads solver.maps solver.transport "
+    "solver.conformal solver.canonical solver.refinement",
     "solver.parameterization": "solver solver.mesh solver.linalg solver.quads solver.analysis solver.maps "
-    "solver.transport solver.cutting solver.seams solver.conformal solver.canonical solver.refinement",
+    "solver.transport solver.cutting solver.seams solver.conformal solver.canonical solver.refinement "
+    "solver.parameterization.polygons",
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
     "solver.arranging": "solver solver.mesh",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",

@@ -12,7 +12,7 @@ from omt_uv.solver.maps.untangle import count_folds, map_energy
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.initial_map import HOPELESS, coarse_initial_map
-from omt_uv.solver.parameterization.polygon_disk import DiskMesh
+from omt_uv.solver.parameterization.polygons.polygon_disk import DiskMesh
 from omt_uv.solver.progress import RunLog, drain
 
 

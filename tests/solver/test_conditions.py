@@ -34,7 +34,7 @@ from omt_uv.solver.mesh.charts import Chart
 from omt_uv.solver.mesh.geometry import affine_images
 from omt_uv.solver.mesh.repair import TINY, _scale
 from omt_uv.solver.parameterization.chart_indices import CornerPins, _lone_triangle, clear_of_pins
-from omt_uv.solver.parameterization.polygon_disk import _by_ears
+from omt_uv.solver.parameterization.polygons.polygon_disk import _by_ears
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.elimination_order import renumbered
 from omt_uv.solver.refinement.initial_maps import _on_square, _perimeter, _snap_corners

@@ -21,7 +21,8 @@ from omt_uv.solver.maps import polygon_elements
 from omt_uv.solver.maps.overlap import cover_pairs
 from omt_uv.solver.mesh import mirror
 from omt_uv.solver.mesh.surface import degenerate_triangles
-from omt_uv.solver.parameterization import chart_indices, polygon_corners
+from omt_uv.solver.parameterization import chart_indices
+from omt_uv.solver.parameterization.polygons import polygon_corners
 from omt_uv.solver.remeshing.components import component_batch
 from omt_uv.solver.remeshing.edits import long_edges
 from omt_uv.solver.remeshing.initial import component_maps

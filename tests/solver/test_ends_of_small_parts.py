@@ -16,7 +16,7 @@ from omt_uv.solver.contact.self_intersections import FaceCrossings, intersecting
 from omt_uv.solver.cutting.protrusions import first_tips
 from omt_uv.solver.errors import MeshError
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.parameterization.convexity import dented_faces
+from omt_uv.solver.parameterization.polygons.convexity import dented_faces
 from omt_uv.solver.refinement.continuation_rules import QUALITIES, stage_tolerances
 
 

@@ -33,9 +33,10 @@ from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.packing.single_precision import without_rounded_folds
 from omt_uv.solver.parameterization import chart_map as chart_maps
-from omt_uv.solver.parameterization import convexity, initial_map
+from omt_uv.solver.parameterization import initial_map
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
+from omt_uv.solver.parameterization.polygons import convexity
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import refine as refining

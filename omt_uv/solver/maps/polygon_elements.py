@@ -23,7 +23,7 @@ MOST_TRIANGLES = 8
 # Share of a quad's area that each of its four triangles needs on the surface for both triangulations to count.
 CONVEX = 0.03
 # Share of what it has there that each needs in the map for that. Below it corners are reflex, and opened
-# (`parameterization.polygon_corners`): quads between two bounds would be neither, and sheared without a word.
+# (`polygons.polygon_corners`): quads between two bounds would be neither, and sheared without a word.
 OPEN = 0.02
 
 

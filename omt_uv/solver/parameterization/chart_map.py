@@ -42,7 +42,7 @@ from .initial_map import (
     roomy_initial_map,
 )
 from .options import MapOptions
-from .polygon_disk import DiskMesh, of_polygon_disk, polygon_disk, with_centres
+from .polygons.polygon_disk import DiskMesh, of_polygon_disk, polygon_disk, with_centres
 
 # Where the time of a chart goes, roughly, as start and width in [0, 1]: a bar that moves evenly needs no more.
 INITIAL = (0.0, 0.4)

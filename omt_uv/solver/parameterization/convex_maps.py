@@ -20,8 +20,8 @@ from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import ChartPins, chart_target
 from .chart_map import FOLDED, ChartMap, in_unit_box, measured_map, refined_again
 from .options import MapOptions
-from .polygon_corners import Forced
-from .polygon_disk import cut_as_mapped
+from .polygons.polygon_corners import Forced
+from .polygons.polygon_disk import cut_as_mapped
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
 AREA_KEPT = 1.1
@@ -58,7 +58,7 @@ def with_convex_polygons(
     drawn = surface if drawn is None else drawn
     if not (np.diff(surface.face_start) > 3).any() or all(map(_is_isometry, maps)):
         return maps
-    from .convexity import reflex_triangles
+    from .polygons.convexity import reflex_triangles
 
     targets = [chart_target(target, surface, c) for c in charts]
     task = _Opening(drawn, charts, pins, options, targets, {})
@@ -98,13 +98,13 @@ class _Opening:
 
     def folded(self, k: int, chart_map: ChartMap) -> int:
         """How many corners of chart k are folded in a map."""
-        from .convexity import reflex_triangles
+        from .polygons.convexity import reflex_triangles
 
         return int(reflex_triangles(self.drawn, [self.charts[k]], [chart_map.uv])[0])
 
     def kept(self, maps: Sequence[ChartMap], which: np.ndarray) -> list[ChartMap]:
         """Maps of some charts (c,) with corners opened as far as areas can be spared."""
-        from .convexity import keep_convex
+        from .polygons.convexity import keep_convex
 
         charts = [cut_as_mapped(self.charts[k], m.uv) for k, m in zip(which, maps, strict=True)]
         fixed = [_fixed(c, self.pins[k], self.options.boundary) for k, c in zip(which, charts, strict=True)]
@@ -124,7 +124,7 @@ class _Opening:
     def opened(self, k: int, old: ChartMap, folded: int) -> Steps[ChartMap | None]:
         """The map of a chart in which so many corners are folded, refined again from where they are open whatever it
         costs; None where that has no more of them open."""
-        from .convexity import keep_convex
+        from .polygons.convexity import keep_convex
 
         # Corners of squares and rectangles, and drafts, stay as they were chosen.
         boundary = self.options.boundary
@@ -148,7 +148,7 @@ class _Opening:
 
 def with_dents_told(drawn: Surface, chart: Chart, chart_map: ChartMap) -> ChartMap:
     """The map with a warning of convex polygons that fold in it if they are cut otherwise than they are drawn."""
-    from .convexity import dented_faces
+    from .polygons.convexity import dented_faces
 
     count = len(dented_faces(drawn, chart, chart_map.uv))
     others = tuple(text for text in chart_map.warnings if not text.endswith(OTHERWISE))
@@ -206,7 +206,7 @@ def _by_triangles(
     surface: Surface, chart: Chart, old: ChartMap, alone: np.ndarray, options: MapOptions, target: Target | None
 ) -> Steps[np.ndarray]:
     """The map (n,2) of a chart refined again with some of its triangles (m,) bool as polygons of their own."""
-    from .convexity import keep_convex
+    from .polygons.convexity import keep_convex
 
     fixed, density = _fixed(chart, None, options.boundary), None if target is None else target.density
     given = [cut_as_mapped(chart, old.uv)], [old.uv], [fixed], [density], [old.area_weight], None

@@ -30,7 +30,7 @@ from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed_uv
 from ..transport.convex_domain import Domain
-from .polygon_disk import DiskMesh
+from .polygons.polygon_disk import DiskMesh
 
 if TYPE_CHECKING:
     from ..conformal.disk_map import ConformalMap

@@ -8,7 +8,7 @@ import pytest
 from omt_uv.solver.maps.energy import area_error, elements, energy, gradient
 from omt_uv.solver.maps.polygon_elements import polygon_elements, polygon_mesh, restricted, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.parameterization.polygon_corners import CONVEX
+from omt_uv.solver.parameterization.polygons.polygon_corners import CONVEX
 
 
 def quads(count=5, seed=0):

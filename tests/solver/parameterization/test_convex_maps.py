@@ -11,7 +11,7 @@ import pytest
 from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
-from omt_uv.solver.parameterization import convex_maps, corner_solver
+from omt_uv.solver.parameterization import convex_maps
 from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart, measured_map
 from omt_uv.solver.parameterization.convex_maps import (
@@ -20,9 +20,10 @@ from omt_uv.solver.parameterization.convex_maps import (
     with_dents_told,
     with_figures,
 )
-from omt_uv.solver.parameterization.convexity import dented_faces, keep_convex, reflex_triangles
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
-from omt_uv.solver.parameterization.polygon_corners import convex_corners
+from omt_uv.solver.parameterization.polygons import corner_solver
+from omt_uv.solver.parameterization.polygons.convexity import dented_faces, keep_convex, reflex_triangles
+from omt_uv.solver.parameterization.polygons.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 

@@ -15,7 +15,6 @@ from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import initial_map as initial_maps
-from omt_uv.solver.parameterization import polygon_disk
 from omt_uv.solver.parameterization.initial_map import (
     DiskMesh,
     coarse_initial_map,
@@ -25,6 +24,7 @@ from omt_uv.solver.parameterization.initial_map import (
     roomy_initial_map,
 )
 from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.polygons import polygon_disk
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import RunLog, drain
 from omt_uv.solver.transport.convex_domain import Disk, Rectangle

@@ -20,16 +20,15 @@ from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
 from omt_uv.solver.parameterization import (
     chart_indices,
     convex_maps,
-    convexity,
     initial_map,
     mirrored_charts,
-    polygon_disk,
     shear_bound,
     shear_search,
     small_charts,
 )
 from omt_uv.solver.parameterization.chart_map import FOLDED, ChartMap
 from omt_uv.solver.parameterization.options import MapOptions, ShearBound, UnwrapOptions
+from omt_uv.solver.parameterization.polygons import convexity, polygon_disk
 from omt_uv.solver.progress import EarlyEnd, RunLog, drain
 from omt_uv.solver.refinement import batch_refine
 from omt_uv.solver.refinement.vertex_sweeps import smoothed_uv

@@ -12,8 +12,9 @@ from scripted_steps import worked
 from omt_uv.solver.analysis import region_density
 from omt_uv.solver.errors import EmptyRegionError, MeshError, ShareError, SoftRegionError
 from omt_uv.solver.parameterization import chart_map as chart_maps
-from omt_uv.solver.parameterization import convex_maps, convexity
+from omt_uv.solver.parameterization import convex_maps
 from omt_uv.solver.parameterization.options import MapOptions
+from omt_uv.solver.parameterization.polygons import convexity
 from omt_uv.solver.progress import RunLog, drain
 
 

@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import mirror_partners, mirrored_map, with_mirrored_quads
 from omt_uv.solver.parameterization.options import UnwrapOptions
-from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk, with_fans
+from omt_uv.solver.parameterization.polygons.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk, with_fans
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.continuation_rules import PROMISED

@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.parameterization.polygon_corners import (
+from omt_uv.solver.parameterization.polygons.polygon_corners import (
     CONVEX,
     CornerBarrier,
     PolygonCorners,

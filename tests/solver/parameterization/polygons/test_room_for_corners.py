@@ -6,7 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.parameterization import convexity
+from omt_uv.solver.parameterization.polygons import convexity
 
 
 def rings(reflex, triangles, n):

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..maps.energy import Elements, energies
-from ..maps.mirror_symmetry import MirrorSymmetry
-from ..maps.polygon_elements import polygon_elements, with_convex_quads
-from ..mesh.polygon_areas import polygon_areas
-from ..refinement.hessian_blocks import assembly_of
-from ..refinement.mirrored_motion import MirroredMotion
-from ..refinement.projected_newton import (
+from ...maps.energy import Elements, energies
+from ...maps.mirror_symmetry import MirrorSymmetry
+from ...maps.polygon_elements import polygon_elements, with_convex_quads
+from ...mesh.polygon_areas import polygon_areas
+from ...refinement.hessian_blocks import assembly_of
+from ...refinement.mirrored_motion import MirroredMotion
+from ...refinement.projected_newton import (
     ARMIJO,
     FOLD_SHARE,
     FreeMotion,

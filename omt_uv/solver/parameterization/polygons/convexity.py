@@ -19,17 +19,17 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..linalg.nested_dissection import vertex_graph
-from ..linalg.sparse import minimum_degree
-from ..maps.contacts import crossings
-from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry, without_symmetry
-from ..maps.polygon_elements import polygon_elements
-from ..mesh.charts import Chart
-from ..mesh.geometry import face_areas, signed_areas
-from ..mesh.polygon_areas import polygon_areas
-from ..mesh.surface import Surface
-from ..mesh.topology import boundary_loops, row_labels
-from ..refinement.mirrored_motion import find_symmetry
+from ...linalg.nested_dissection import vertex_graph
+from ...linalg.sparse import minimum_degree
+from ...maps.contacts import crossings
+from ...maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry, without_symmetry
+from ...maps.polygon_elements import polygon_elements
+from ...mesh.charts import Chart
+from ...mesh.geometry import face_areas, signed_areas
+from ...mesh.polygon_areas import polygon_areas
+from ...mesh.surface import Surface
+from ...mesh.topology import boundary_loops, row_labels
+from ...refinement.mirrored_motion import find_symmetry
 from .corner_solver import CornerMesh, CornerPatches
 from .polygon_corners import (
     CONVEX,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..maps.polygon_elements import OPEN
-from ..mesh.geometry import cross3, part_by_part
-from ..mesh.surface import Surface
+from ...maps.polygon_elements import OPEN
+from ...mesh.geometry import cross3, part_by_part
+from ...mesh.surface import Surface
 
 # A corner counts where it has this share of its polygon's area on the surface.
 SHARP = 1e-3

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from omt_uv.solver.parameterization.corner_solver import CornerMesh, CornerPatches, affordable
-from omt_uv.solver.parameterization.polygon_corners import PolygonCorners
+from omt_uv.solver.parameterization.polygons.corner_solver import CornerMesh, CornerPatches, affordable
+from omt_uv.solver.parameterization.polygons.polygon_corners import PolygonCorners
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -12,19 +12,19 @@ from functools import cached_property
 
 import numpy as np
 
-from ..canonical.embeddings import mean_value_sites
-from ..conformal.boundary_first import FlatDisk, boundary_first
-from ..errors import PrecisionError
-from ..linalg.nested_dissection import mesh_order
-from ..maps.polygon_elements import polygon_mesh
-from ..maps.untangle import is_one_to_one
-from ..mesh.charts import Chart
-from ..mesh.geometry import cross2, cross3, face_areas, signed_areas
-from ..mesh.polygon_areas import polygon_fans
-from ..mesh.topology import boundary_loops, distinct
-from ..quads.diagonals import shorter_diagonals
-from ..refinement.initial_maps import is_far
-from ..transport.convex_domain import Disk, Domain, Rectangle
+from ...canonical.embeddings import mean_value_sites
+from ...conformal.boundary_first import FlatDisk, boundary_first
+from ...errors import PrecisionError
+from ...linalg.nested_dissection import mesh_order
+from ...maps.polygon_elements import polygon_mesh
+from ...maps.untangle import is_one_to_one
+from ...mesh.charts import Chart
+from ...mesh.geometry import cross2, cross3, face_areas, signed_areas
+from ...mesh.polygon_areas import polygon_fans
+from ...mesh.topology import boundary_loops, distinct
+from ...quads.diagonals import shorter_diagonals
+from ...refinement.initial_maps import is_far
+from ...transport.convex_domain import Disk, Domain, Rectangle
 
 # Triangles of a polygon that is cut by its ears, at most: that takes the square of them.
 MOST_TRIANGLES = 500

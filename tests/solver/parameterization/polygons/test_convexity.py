@@ -9,10 +9,10 @@ import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
-from omt_uv.solver.parameterization import convexity, polygon_corners
-from omt_uv.solver.parameterization.convexity import keep_convex
-from omt_uv.solver.parameterization.polygon_corners import convex_corners
-from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped
+from omt_uv.solver.parameterization.polygons import convexity, polygon_corners
+from omt_uv.solver.parameterization.polygons.convexity import keep_convex
+from omt_uv.solver.parameterization.polygons.polygon_corners import convex_corners
+from omt_uv.solver.parameterization.polygons.polygon_disk import cut_as_mapped
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
