@@ -48,7 +48,8 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import bound_shear, in_pieces
+from .pieces import in_pieces
+from .shear_bound import bound_shear
 from .shear_search import NEARLY, Round, ShearSearch
 from .small_charts import is_small, map_together
 

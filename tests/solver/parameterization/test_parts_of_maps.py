@@ -22,6 +22,7 @@ from omt_uv.solver.parameterization import (
     convex_maps,
     initial_map,
     mirrored_charts,
+    pieces,
     shear_bound,
     shear_search,
     small_charts,
@@ -498,12 +499,12 @@ def test_maps_of_pieces_shear_less_in_the_mean_by_area():
         return [SimpleNamespace(angle_mean=s, folds=folds, failure=failure) for s in shears]
 
     before = maps(1.4, 1.2)
-    assert shear_bound._shears_less(charts, maps(1.7, 1.1), before)
-    assert not shear_bound._shears_less(charts, maps(1.1, 1.3), before)
-    assert not shear_bound._shears_less(charts, maps(1.0, 1.0, folds=1), before)
-    assert shear_bound._shears_less(charts, maps(1.0, 1.0, folds=1), maps(1.4, 1.2, folds=1))
-    assert not shear_bound._shears_less(charts, maps(1.0, 1.0, failure="no"), before)
-    assert not shear_bound._shears_less(charts, before, before)
+    assert pieces._shears_less(charts, maps(1.7, 1.1), before)
+    assert not pieces._shears_less(charts, maps(1.1, 1.3), before)
+    assert not pieces._shears_less(charts, maps(1.0, 1.0, folds=1), before)
+    assert pieces._shears_less(charts, maps(1.0, 1.0, folds=1), maps(1.4, 1.2, folds=1))
+    assert not pieces._shears_less(charts, maps(1.0, 1.0, failure="no"), before)
+    assert not pieces._shears_less(charts, before, before)
 
 
 @pytest.mark.parametrize(
