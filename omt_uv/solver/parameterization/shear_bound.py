@@ -23,6 +23,7 @@ from .shear_search import (
     NEARLY,
     NO_EXCESS,
     STEEP,
+    UNSHEARED,
     Asked,
     Round,
     ShearSearch,
@@ -53,10 +54,9 @@ WORTHWHILE = 0.03
 HOPES = (1.0, 0.5)
 # What misses the bound by less may keep it with areas that are no more exact than is promised.
 SPARED = 0.05
-# Of what came apart parts with this share of the area are searched anew, unless they shear no more than this: a shorter
-# cut would go across what lies flat along its edges.
+# Of what came apart parts with this share of the area are searched anew, unless they lie flat: a shorter cut would go
+# across what does along its edges.
 LARGE_PART = 0.03
-UNSHEARED = 1.001
 # Of charts with more vertices cuts are straight, but for what the search has no eye for.
 IN_STEPS = 10000
 # Charts that shear more come apart around flat sides, where that leaves no more than this share of log(shear).
@@ -66,6 +66,8 @@ LEFT = 0.5
 SEARCHING = 0.25
 # Where charts lie on themselves that may, before that.
 PARTING = 0.3
+# Charts that are joined again, at the end.
+JOINING = 0.05
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,20 @@ def bound_shear(
     a whole that was searched. Progress offers an early end: with the maps of the last round. Errors: see `map_charts`.
     """
     early, free = EarlyEnd(), crossing is not None
-    best = last = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
-    best = last = last.settled_where_searched() if of_pieces else last
+    begun = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
+    begun = begun.settled_where_searched() if of_pieces else begun
+    rounds = _further_rounds(search, begun, map_charts, crossing, map_sparing, early)
+    found = yield from part_of(rounds, 0.0, 1 - JOINING)
+    if not early.is_asked:
+        found = yield from part_of(_joined_again(search, begun, found, map_charts, early), 1 - JOINING, JOINING)
+    return _result(found, search, first.warnings, early)
+
+
+def _further_rounds(
+    search: ShearSearch, begun: Round, map_charts, crossing, map_sparing, early: EarlyEnd
+) -> Steps[Round]:
+    """The best of the rounds after a first one, see `bound_shear`; made shorter where it keeps the bound."""
+    best = last = begun
     spread, promised, crossed = search.first_spread(), np.full(search.count, np.inf), False
     tried, worse, rehearsed = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]](), dict[str, Any]()
     for rounds in range(1, MOST_ROUNDS):
@@ -120,7 +134,7 @@ def bound_shear(
             # What is steep alone, as single triangles of a coarse mesh are, need not be slit.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
-                return _result(spared, search, first.warnings, early)
+                return spared
         is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
         parting = part_of(_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
         parts = yield from unless_ended(parting, early)
@@ -145,7 +159,22 @@ def bound_shear(
     best = last if last.excess <= best.excess else best
     if not early.is_asked:
         best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
-    return _result(best, search, first.warnings, early)
+    return best
+
+
+def _joined_again(search: ShearSearch, begun: Round, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
+    """A round with charts joined that came apart after the first round, see `rejoining.rejoined`."""
+    if len(last.charts) <= len(begun.charts):
+        return last
+    from .rejoining import rejoined
+
+    def cut(last: Round, kept: np.ndarray, most: float) -> Steps[Round | None]:
+        asked = Asked(
+            [], kept, search.first_spread(), {}, lambda edges: joined(search, last.cuts, edges).length <= most
+        )
+        return (yield from _cut_anew(search, last, asked, map_charts, early))
+
+    return (yield from rejoined(search, begun, last, cut))
 
 
 def _first_round(

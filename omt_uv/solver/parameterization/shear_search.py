@@ -43,6 +43,8 @@ MOST_STEEP = 0.01
 LEAST_AREA = 1e-4
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
 NO_EXCESS = 0.005
+# What shears no more lies flat.
+UNSHEARED = 1.001
 # What misses the bound by less misses it by little.
 NEARLY = 0.03
 # Where a second search and later ones take off less than this share of what is missing, no seams are left that pay.

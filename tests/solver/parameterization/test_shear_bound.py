@@ -16,7 +16,7 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths, face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
-from omt_uv.solver.parameterization import shear_bound, shear_search
+from omt_uv.solver.parameterization import pieces, shear_bound, shear_search
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.chart_indices import identity, within
 from omt_uv.solver.parameterization.chart_map import local_shear, map_chart
@@ -42,7 +42,7 @@ def steepness(result):
 
 def test_seams_bring_the_shear_under_the_bound(monkeypatch):
     # Whether it fills a texture is another question.
-    monkeypatch.setattr(shear_bound, "COMPACT", np.inf)
+    monkeypatch.setattr(pieces, "COMPACT", np.inf)
     V, F = meshes.cap(rings=12, sectors=24, opening=0.85)
     surface = triangle_surface(V, F)
     assert max(mean_shear(unwrapped(surface, 0))) > 1.3

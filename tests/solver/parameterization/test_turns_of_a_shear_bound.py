@@ -67,6 +67,7 @@ def bounded(monkeypatch):
 
     def run(*rounds, apart=(), crossed=(), spared=None, crossing="crossing", stop=None, ask_end=None, **given):
         asked, rest, parts, crossings = [], list(rounds[1:]), list(apart), list(crossed)
+        joined = []
 
         def first(search, prepared, maps, map_charts, free, early):
             asked.append(("first", free))
@@ -98,6 +99,11 @@ def bounded(monkeypatch):
             asked.append(("shorter", best.name))
             return worked(best)
 
+        def again(search, begun, last, map_charts, early):
+            joined.append((begun.name, last.name))
+            yield from ()
+            return last
+
         class Early:
             is_asked = False
 
@@ -110,6 +116,8 @@ def bounded(monkeypatch):
         monkeypatch.setattr(shear_bound, "_cut_anew", anew)
         monkeypatch.setattr(shear_bound, "_with_areas_spared", spare)
         monkeypatch.setattr(shear_bound, "_made_shorter", shorter)
+        monkeypatch.setattr(shear_bound, "_joined_again", again)
+        monkeypatch.setattr(shear_bound, "JOINING", 0.0)
         monkeypatch.setattr(shear_bound, "_result", lambda best, search, warnings, early: (best.name, early.is_asked))
         search = SimpleNamespace(first_spread=lambda: np.array([8.0]), count=1)
         prepared = SimpleNamespace(warnings=())
@@ -119,6 +127,8 @@ def bounded(monkeypatch):
                 fractions.append(next(steps).fraction)
         except StopIteration as stop:
             found = stop.value
+        # Charts are joined at the very end, of what there is then, unless somebody waits for it.
+        assert joined == ([] if found[1] else [(rounds[0].name, found[0])])
         # A round that is broken off is done anew by what makes the best shorter.
         assert min(fractions) >= 0 and max(fractions) <= 1 + 1e-9
         return found, asked, fractions
