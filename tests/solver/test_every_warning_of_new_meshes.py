@@ -17,7 +17,7 @@ from omt_uv.solver.progress import drain
 from omt_uv.solver.registration import register as registers
 from omt_uv.solver.registration import results
 from omt_uv.solver.registration.landmarks import vertex_landmarks
-from omt_uv.solver.remeshing import remesh_surface
+from omt_uv.solver.remeshing import remesh_component, remesh_surface
 from omt_uv.solver.remeshing.components.components import split_components
 from omt_uv.solver.remeshing.initial import component_maps, disk_images, initial_mesh
 from omt_uv.solver.remeshing.initial.options import RemeshOptions
@@ -153,6 +153,23 @@ def without_maps(patch):
         if fails:
             patch.setattr(initial_mesh, "triangulate_chart", lambda *_: None)
         yield remeshed(V, F, 40, rounds=1, strategy="cfp-cfp").warnings, told
+
+
+@says("solver/remeshing/remesh_component.py", "A part is thinner than the new triangles")
+def too_thin(patch):
+    """Boxes, and needles of which 20 vertices do not reach both ends."""
+    V, F = meshes.cube()
+    text = "A part is thinner than the new triangles and does not keep its shape. Ask for more, or remesh it by itself"
+    for thin, count, told in ((0.3, 20, []), (0.01, 20, [text]), (0.01, 40, [])):
+        yield remeshed(V * [1, thin, thin], F, count, rounds=4).warnings, told
+
+
+def test_what_is_far_is_told_by_the_edges_that_are_asked_for_there():
+    component = split_components(*meshes.grid(4, 4), NO_LINES).components[0]
+    corner, count = component.vertices[:1], len(component.triangles)
+    far = np.linalg.norm(component.vertices - corner, axis=1).max()
+    for edge, told in ((far / 1.49, False), (far / 1.51, True)):
+        assert bool(remesh_component._too_thin(component, corner, np.full(count, edge))) == told
 
 
 @says("solver/remeshing/initial/sample_plan.py", "{} vertices for a part are too few")

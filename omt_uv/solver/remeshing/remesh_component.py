@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..mesh.closest_point import ClosestPoint
 from ..mesh.geometry import vertex_normals
@@ -31,6 +32,8 @@ MAX_BALANCES = 6
 MAX_ATTEMPTS = 3
 # By how much then, in distance between samples.
 SPARSER = 2.0
+# No point of a surface is farther from the vertices of its new mesh than this many edges: they are 0.6 to 0.8.
+FAR = 1.5
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ def _settled(
     if options.fit:
         mesh = yield from part_of(fit_to_surface(mesh, index, level), 0.57, 0.43)
     points, triangles = reopened(mesh.points, mesh.triangles, start.to_reopen)
+    thin = _too_thin(component, points, start.size / np.sqrt(level))
     on = index(points, vertex_normals(points, triangles))
     return RemeshedComponent(
         points=points - component.shift[on.faces],
@@ -90,8 +94,21 @@ def _settled(
         faces=component.faces[on.faces],
         barycentric=np.einsum("kc,kcj->kj", on.barycentric, component.input_barycentric[on.faces]),
         residual=residual,
-        warnings=start.warnings,
+        warnings=(*start.warnings, *thin),
     )
+
+
+def _too_thin(component: Component, points: np.ndarray, edge: np.ndarray) -> list[str]:
+    """A warning where vertices of a component are far from all points (k,3) of a new mesh whose edges are to be so long
+    in its triangles, (m,): what is thinner than these, as strings are, ends too early or is in folds."""
+    reach = np.zeros(len(component.vertices))
+    np.maximum.at(reach, component.triangles, FAR * edge[:, None])
+    far = cKDTree(points).query(component.vertices)[0] > reach
+    if not far.any():
+        return []
+    return [
+        "A part is thinner than the new triangles and does not keep its shape. Ask for more, or remesh it by itself"
+    ]
 
 
 def _relaxed(
