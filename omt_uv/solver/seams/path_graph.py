@@ -112,7 +112,7 @@ def path_graph(
         ends, length = ends[keep], length[keep]
         length = np.where((image[ends] == ends).all(axis=1), length, 2 * length)
     ends = np.sort(ends, axis=1)
-    keys, first = np.unique(_keys(*ends.T, n), return_index=True)
+    keys, first = np.unique(_keys(ends[:, 0], ends[:, 1], n), return_index=True)
     ends, length = ends[first], length[first]
     # A step without length still costs something: sparse graphs take a zero for no step.
     floor = 1e-9 * max(float(length.mean()) if len(length) else 1.0, 1e-30)
