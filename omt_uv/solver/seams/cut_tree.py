@@ -96,7 +96,7 @@ class Removal:
         free, when = free[order], when[order]
         if not len(free):
             return np.zeros(len(gone))
-        total = np.concatenate([[0.0], prefix_energies(self.inverse[np.ix_(free, free)], self.force[free])])
+        total = np.concatenate([[0.0], prefix_energies(self.inverse[free[:, None], free], self.force[free])])
         return total[np.searchsorted(when, np.arange(len(gone)), side="right")]
 
 

@@ -23,7 +23,7 @@ BARRED = 0.05
 # Relative difference up to which two are worth the same.
 EVEN = 1e-6
 # Shares of the way to an extremity at which a path may end.
-STOPS = (1.0, 0.8, 0.6)
+STOPS = np.array([1.0, 0.8, 0.6])
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def _arcs(task: Task, cut: Cut, model: ScaleModel) -> list[_Arc]:
         path, best = path_to(before, int(tip)), None
         reach = cost[path]
         # From the first vertex that is near enough, or where a cut may end as anywhere; the last is on the cut already.
-        begins = {int(np.argmax(reach <= stop * reach[0] + 1e-12)) for stop in STOPS}
+        begins = set((reach <= STOPS[:, None] * reach[0] + 1e-12).argmax(axis=1).tolist())
         begins.add(int(np.argmax(task.tip_factor[path] > BARRED)))
         new, count = _from_cut_on(path, graph.image)
         if not len(new):
@@ -105,7 +105,8 @@ def _from_cut_on(path: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.nd
     """Vertices (v,) off the cut of a path (k,) that ends on it, each with its image (n,), those near the cut first; and
     how many of them (k-1,) are on the path from each of its vertices on."""
     onwards = path[-2::-1]
-    both = np.column_stack([onwards, image[onwards]])
+    both = np.empty((len(onwards), 2), np.int64)
+    both[:, 0], both[:, 1] = onwards, image[onwards]
     apart = both[:, 0] != both[:, 1]
     kept = np.ones(both.shape, dtype=bool)
     kept[:, 1] = apart

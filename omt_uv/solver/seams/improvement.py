@@ -28,29 +28,44 @@ MOST_REGROWN = 12
 def improved(task: Task, cut: Cut, trials: int) -> Iterator[Cut]:
     """Cuts within the bound, each as good as the one before or better, one for each of so many trials."""
     rng = np.random.default_rng(0)
-    in_vain = 0
+    in_vain, (found, order) = 0, _leaves_by_worth(task, cut)
+    # Few leaves make few sets, and most sets grow back: what they come to is found once.
+    regrown: dict[bytes, Cut] = {}
+    finished: dict[bytes, Cut] = {}
     for _ in range(trials):
-        found = leaves(task.graph, cut.steps)
         if not found:
             return
-        base = _taken_back(task, cut, found, in_vain, rng)
-        other = trimmed(task, rerouted(task, grow(task, base, MOST_REGROWN)))
+        left = np.setdiff1d(cut.steps, np.concatenate(_taken_back(found, order, in_vain, rng)))
+        if left.tobytes() not in regrown:
+            grown = grow(task, cut_along(task, left), MOST_REGROWN)
+            name = grown.steps.tobytes()
+            if name not in finished:
+                finished[name] = trimmed(task, rerouted(task, grown))
+            regrown[left.tobytes()] = finished[name]
+        other = regrown[left.tobytes()]
         within = other.spread <= max(task.bound, cut.spread)
         better = within and other.score(task.bound) < cut.score(task.bound) * (1 - BETTER)
-        cut, in_vain = (other, 0) if better else (cut, in_vain + 1)
+        in_vain += 1
+        if better:
+            cut, in_vain, (found, order) = other, 0, _leaves_by_worth(task, other)
         yield cut
 
 
-def _taken_back(task: Task, cut: Cut, found: list[np.ndarray], in_vain: int, rng: np.random.Generator) -> Cut:
-    """The cut without the leaf that is worth least for its length, or, where those were in vain, without some."""
+def _leaves_by_worth(task: Task, cut: Cut) -> tuple[list[np.ndarray], np.ndarray]:
+    """The leaves of a cut, and their numbers (k,), those first that are worth least for their length."""
+    found = leaves(task.graph, cut.steps)
+    if not found:
+        return found, np.zeros(0, np.int64)
     without = Removal.of(task, cut)
     worth = [without.losses(leaf)[-1] / task.graph.cost[leaf].sum() for leaf in found]
-    order = np.argsort(worth, kind="stable")
+    return found, np.argsort(worth, kind="stable")
+
+
+def _taken_back(found: list[np.ndarray], order: np.ndarray, in_vain: int, rng: np.random.Generator) -> list[np.ndarray]:
+    """The leaf that is worth least, or, where those were in vain, some."""
     if in_vain < len(found):
-        gone = [found[order[in_vain]]]
-    else:
-        gone = [found[k] for k in np.flatnonzero(rng.random(len(found)) < RANDOM_SHARE)] or [found[order[0]]]
-    return cut_along(task, np.setdiff1d(cut.steps, np.concatenate(gone)))
+        return [found[order[in_vain]]]
+    return [found[k] for k in np.flatnonzero(rng.random(len(found)) < RANDOM_SHARE)] or [found[order[0]]]
 
 
 def trimmed(task: Task, cut: Cut) -> Cut:

@@ -22,10 +22,10 @@ class PathGraph:
 
     Attributes
     ----------
-    ends (e,2), cost (e,) : of every step, cost in lengths over the size of the surface
+    ends (e,2) : of every step, ascending, those of steps, too; cost (e,) : in lengths over the size of the surface
     boundary (n,) bool : vertices where cuts may begin for nothing
     image (n,) : vertex that is cut together with each, its mirror image; itself where there is no mirror
-    matrix (n,n) : cost; number (n,n) : of the step, from 1
+    matrix (n,n) : cost; keys (e,) : of every step, ascending, see `_keys`
     in_plane (n,) bool : vertices in the mirror plane. A path may leave the plane but never come back to it, since it
         would, with its mirror image, close a loop: `matrix` has no such steps
     """
@@ -35,7 +35,7 @@ class PathGraph:
     boundary: np.ndarray
     image: np.ndarray
     matrix: csr_matrix
-    number: csr_matrix
+    keys: np.ndarray
     in_plane: np.ndarray
 
     def paths_from(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -50,8 +50,11 @@ class PathGraph:
 
     def depth(self, steps: np.ndarray) -> np.ndarray:
         """Cost (n,) of the way from the boundary along steps (k,) alone."""
-        n = len(self.boundary)
-        tree = csr_matrix((self.cost[steps], self.ends[steps].T), shape=(n, n))
+        n, steps = len(self.boundary), np.sort(steps)
+        # Steps are in the order of their ends: those of a row follow each other.
+        rows, columns = self.ends[steps].T
+        begin = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
+        tree = csr_matrix((self.cost[steps], columns, begin), shape=(n, n))
         return dijkstra(tree, directed=False, indices=np.flatnonzero(self.boundary), min_only=True)
 
     def is_open(self, steps: np.ndarray) -> bool:
@@ -64,7 +67,8 @@ class PathGraph:
 
     def steps_of(self, path: np.ndarray) -> np.ndarray:
         """Steps (k,) between the vertices (k+1,) of a path."""
-        return np.asarray(self.number[path[:-1], path[1:]]).ravel() - 1
+        one, other = path[:-1], path[1:]
+        return np.searchsorted(self.keys, _keys(np.minimum(one, other), np.maximum(one, other), len(self.boundary)))
 
     def vertices_of(self, steps: np.ndarray) -> np.ndarray:
         """Vertices (k,) of steps and of their mirror images, off the boundary, sorted."""
@@ -108,19 +112,21 @@ def path_graph(
         ends, length = ends[keep], length[keep]
         length = np.where((image[ends] == ends).all(axis=1), length, 2 * length)
     ends = np.sort(ends, axis=1)
-    _, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
+    keys, first = np.unique(_keys(ends[:, 0], ends[:, 1], n), return_index=True)
     ends, length = ends[first], length[first]
     # A step without length still costs something: sparse graphs take a zero for no step.
     floor = 1e-9 * max(float(length.mean()) if len(length) else 1.0, 1e-30)
     cost = (length + floor) * factor[ends].mean(axis=1) / surface.size
     (rows, columns), both = np.concatenate([ends, ends[:, ::-1]]).T, np.tile(cost, 2)
-    number = csr_matrix((np.tile(np.arange(len(cost)) + 1, 2), (rows, columns)), shape=(n, n))
     in_plane = np.zeros(n, dtype=bool) if mirrored is None else image == np.arange(n)
     onwards = in_plane[rows] | ~in_plane[columns]
     matrix = csr_matrix((both[onwards], (rows[onwards], columns[onwards])), shape=(n, n))
-    return PathGraph(
-        ends=ends, cost=cost, boundary=boundary, image=image, matrix=matrix, number=number, in_plane=in_plane
-    )
+    return PathGraph(ends=ends, cost=cost, boundary=boundary, image=image, matrix=matrix, keys=keys, in_plane=in_plane)
+
+
+def _keys(lower: np.ndarray, upper: np.ndarray, n: int) -> np.ndarray:
+    """One integer (k,) for each step between vertices (k,) and (k,) of n, in their order."""
+    return lower * n + upper
 
 
 def path_to(before: np.ndarray, end: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.seams import coarse_cut, search
+from omt_uv.solver.seams import coarse_cut, improvement, search
 from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.cut_tree import Removal, Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
@@ -76,6 +76,15 @@ def test_growth_keeps_the_bound_and_lowers_the_spread_with_every_arc(cap):
     parts = stretches(task.graph, better.steps)
     assert np.array_equal(np.sort(np.concatenate(parts)), better.steps)
     assert 0 < len(leaves(task.graph, better.steps)) <= len(parts)
+
+
+def test_what_is_taken_back_grows_anew_once(cap, monkeypatch):
+    task = task_of(cap, 0.02)
+    cut = trimmed(task, grow(task, cut_along(task, np.zeros(0, np.int64)), 30))
+    asked, ask = [], improvement.grow
+    monkeypatch.setattr(improvement, "grow", lambda *given: asked.append(given[1].steps.tobytes()) or ask(*given))
+    found = list(improved(task, cut, 40))
+    assert len(found) == 40 and 0 < len(asked) == len(set(asked)) < 40
 
 
 def test_what_a_cut_loses_is_told_without_a_new_solve(cap):
@@ -268,17 +277,16 @@ def test_the_model_of_what_was_found_last_is_not_made_again(monkeypatch):
 
 def test_a_path_may_leave_the_mirror_plane_and_not_come_back():
     """One step that comes back is enough, whatever the others do; a path within the plane never left it."""
-    ends = np.array([[0, 1], [1, 2], [2, 3], [1, 4], [4, 5]])
+    ends = np.array([[0, 1], [1, 2], [1, 4], [2, 3], [4, 5]])
     n, count = 6, np.arange(1, 6)
     both = np.concatenate([ends, ends[:, ::-1]])
-    square = {
-        k: csr_matrix((np.tile(v, 2), both.T), shape=(n, n)) for k, v in (("matrix", count * 1.0), ("number", count))
-    }
+    matrix, keys = csr_matrix((np.tile(count * 1.0, 2), both.T), shape=(n, n)), ends @ [n, 1]
     # 0 is on the boundary, 1 and 2 are in the plane, and so is 5, behind 4, which is not.
     boundary, in_plane = np.arange(n) == 0, np.isin(np.arange(n), [0, 1, 2, 5])
-    graph = PathGraph(ends, count * 1.0, boundary, np.arange(n), **square, in_plane=in_plane)
-    assert graph.is_open(np.array([0, 1, 2])) and graph.is_open(np.array([0, 3]))
-    assert not graph.is_open(np.array([0, 3, 4])) and not graph.is_open(np.arange(5))
+    graph = PathGraph(ends, count * 1.0, boundary, np.arange(n), matrix, keys, in_plane)
+    np.testing.assert_array_equal(graph.steps_of(np.array([5, 4, 1, 2, 3])), [4, 2, 1, 3])
+    assert graph.is_open(np.array([0, 1, 3])) and graph.is_open(np.array([0, 2]))
+    assert not graph.is_open(np.array([4, 2, 0])) and not graph.is_open(np.arange(5))
     assert replace(graph, in_plane=np.zeros(n, bool)).is_open(np.arange(5))
 
 
