@@ -68,11 +68,12 @@ def leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
                 yield from leaves(getattr(value, field.name), depth + 1)
 
 
-def told_leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
-    """Leaves as above of what is told as well: the letters of texts without paths, and the numbers in them."""
+def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndarray]:
+    """Leaves as above of what is told as well: the letters of texts without paths, and the numbers in them;
+    those of errors, too, if asked for."""
     if isinstance(value, Enum):
         value = value.value
-    if isinstance(value, BaseException):
+    if errors and isinstance(value, BaseException):
         # What others say differs from version to version.
         own = type(value).__module__.startswith(omt_uv.__name__) and value.__cause__ is None
         value = f"{type(value).__name__}: {value if own else ''}"
@@ -89,15 +90,15 @@ def told_leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
     elif isinstance(value, (tuple, list, set, frozenset)) and depth < 6:
         yield np.asarray(len(value))
         for item in sorted(value, key=repr) if isinstance(value, (set, frozenset)) else value:
-            yield from told_leaves(item, depth + 1)
+            yield from told_leaves(item, depth + 1, errors)
     elif isinstance(value, dict) and depth < 6:
         for key, item in value.items():
             if key != "seconds":
-                yield from told_leaves([key, item], depth + 1)
+                yield from told_leaves([key, item], depth + 1, errors)
     elif dataclasses.is_dataclass(value) and not isinstance(value, type) and depth < 6:
         for field in dataclasses.fields(value):
             if not field.name.startswith("_") and field.name != "seconds":
-                yield from told_leaves(getattr(value, field.name), depth + 1)
+                yield from told_leaves(getattr(value, field.name), depth + 1, errors)
     else:
         yield from leaves(value, depth)
 
@@ -199,6 +200,8 @@ class Record:
 class Told(Record):
     """Figures of what comes of the first calls of every function in each run, and how many there are."""
 
+    errors = False
+
     def __init__(self, most: int) -> None:
         super().__init__(most)
         self.figures: dict[str, np.ndarray] = {}
@@ -222,7 +225,7 @@ class Told(Record):
     def add(self, name: str, value, k: int = 1) -> None:
         """Add the figures of a value to those of a name."""
         # Of pictures and the like some numbers stand for all.
-        found = [leaf.ravel()[:: 1 + leaf.size // SAMPLED] for leaf in told_leaves(value)]
+        found = [leaf.ravel()[:: 1 + leaf.size // SAMPLED] for leaf in told_leaves(value, errors=self.errors)]
         own = np.array([1.0, *figures(found)]) * (1 + 0.1 * (k - 1))
         self.figures[name] = self.figures.get(name, np.zeros(3)) + own
 
@@ -235,6 +238,8 @@ STEPS = 60
 
 class Within(Told):
     """As `Told`, and what every function is given, what it tells on the way, and why it refuses."""
+
+    errors = True
 
     def begin(self, name: str, function: Callable, args: tuple, kwargs: dict) -> Call | None:
         """A call that begins: what it is given is counted; None if nothing is."""
