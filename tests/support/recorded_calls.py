@@ -231,7 +231,8 @@ class Told(Record):
 
 
 # What stands behind names of what is given, and of what is told before the end.
-GIVEN, ON_THE_WAY = " given", " on the way"
+GIVEN = " given"
+ON_THE_WAY = " on the way"
 # So much of the way is counted.
 STEPS = 60
 
