@@ -65,3 +65,43 @@ def percents():
 def test_what_stands_before_a_percent_sign_is_a_hundred_times_a_share(where, number):
     text = ast.unparse(number)
     assert text.startswith("100 * ") or text in PERCENTS, (where, text)
+
+
+# What a sentence may be about, by the last of the names by which the sources call it.
+ABOUT = {"PROGRAM", "about", "address", "attributes", "bare", "cause", "every", "file", "filename", "has", "histogram",
+         "image", "index", "input", "label", "made", "name", "names", "output", "path", "plot", "source", "stem",
+         "target", "text", "where", "whole"}  # fmt: skip
+# What is never one of the things that are named within a sentence.
+ABOUT_ALONE = {"names", "obj.name", "options.input", "options.output", "path"}
+
+
+def put_in():
+    """Values that are put into texts: the place, what is written there, whether a colon follows at once at the
+    beginning, and whether it is quoted."""
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                for k, value in enumerate(node.values):
+                    if isinstance(value, ast.FormattedValue):
+                        rest = node.values[k + 1] if k + 1 < len(node.values) else None
+                        leads = k == 0 and isinstance(rest, ast.Constant) and rest.value.startswith(": ")
+                        yield (
+                            f"{path.relative_to(ROOT)}:{node.lineno}",
+                            value.value,
+                            leads,
+                            value.conversion == ord("r"),
+                        )
+
+
+def test_what_stands_before_the_colon_of_a_sentence_is_what_it_is_about_and_is_not_quoted_in_another():
+    """An object, a file, or the like; what is named in quotes is something of it."""
+    found = list(put_in())
+    leading = [(place, value) for place, value, leads, _ in found if leads]
+    assert len(leading) > 100
+    names = [(place, [n.id if isinstance(n, ast.Name) else n.attr if isinstance(n, ast.Attribute) else n.value
+                      for n in ast.walk(value) if isinstance(n, ast.Name | ast.Attribute | ast.Constant)])
+             for place, value in leading]  # fmt: skip
+    assert [place for place, of in names if not ABOUT & {n for n in of if isinstance(n, str)}] == []
+    quoted = [(place, ast.unparse(value)) for place, value, _, is_quoted in found if is_quoted]
+    assert len(quoted) > 60
+    assert [pair for pair in quoted if pair[1] in ABOUT_ALONE] == []

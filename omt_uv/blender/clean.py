@@ -14,37 +14,50 @@ TOGETHER = 1e-6
 
 def turn_outside(obj: bpy.types.Object) -> int:
     """Turn faces over until all look outside; how many were turned."""
-    return _changed(obj, _turn)
+    return _changed(obj, _turn)[0]
 
 
 def merge(obj: bpy.types.Object) -> int:
     """Join vertices that lie on one another; how many went."""
-    return _changed(obj, _merge)
+    return _changed(obj, _merge)[0]
 
 
 def dissolve(obj: bpy.types.Object) -> int:
     """Dissolve faces without area and edges without length; how many vertices and faces went."""
-    return _changed(obj, _dissolve)
+    return sum(_changed(obj, _dissolve))
 
 
-def _changed(obj: bpy.types.Object, change: Callable[[bmesh.types.BMesh, float], int]) -> int:
+def _changed(obj: bpy.types.Object, change: Callable[[bmesh.types.BMesh, float], int]) -> tuple[int, int]:
+    """Change a mesh: what the change says it did, and how many faces went before that no change can be made with."""
     mesh = obj.data
     extent = max(obj.dimensions) / max(1e-30, max(map(abs, obj.matrix_world.to_scale())))
     if obj.mode == "EDIT":
         edit = bmesh.from_edit_mesh(mesh)
         count = change(edit, extent)
         bmesh.update_edit_mesh(mesh)
-        return count
+        return count, 0
     edit = bmesh.new()
     try:
         edit.from_mesh(mesh)
+        left_out = _leave_out_invalid(edit, mesh)
         count = change(edit, extent)
         if count:
             edit.to_mesh(mesh)
             mesh.update()
     finally:
         edit.free()
-    return count
+    return count, left_out
+
+
+def _leave_out_invalid(edit: bmesh.types.BMesh, mesh: bpy.types.Mesh) -> int:
+    """Take away faces that use a vertex twice, which Blender's commands never come to the end of; how many went."""
+    if all(len(set(face.verts)) == len(face.verts) for face in edit.faces):
+        return 0
+    edit.clear()
+    count = len(mesh.polygons)
+    mesh.validate()
+    edit.from_mesh(mesh)
+    return count - len(mesh.polygons)
 
 
 def _turn(edit: bmesh.types.BMesh, _extent: float) -> int:

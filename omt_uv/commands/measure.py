@@ -77,12 +77,12 @@ def run(options: argparse.Namespace) -> None:
         strain = _strain(pairs, options) if options.beltrami else ""
         with blaming(pairs):
             figures = None if options.beltrami else measure_readings(readings)
+        rows = _regions(options, pairs) if options.regions else []
         if options.histogram:
             from ..display.histogram import histogram
 
             write_picture(options.histogram, histogram([evaluated(reading) for reading in readings]))
         write_preview(options, pairs)
-        rows = _regions(options, pairs) if options.regions else []
         if options.attributes:
             _write_attributes(options, pairs)
     if figures is None:

@@ -183,3 +183,14 @@ def test_a_picture_of_a_checker_stands_the_right_way_up(package):
     obj.material_slots[0].material = mine
     checker.take_off(obj)
     assert mine in [slot.material for slot in obj.material_slots] or not obj.material_slots
+
+
+@pytest.mark.parametrize("name", ["merge", "dissolve", "turn_outside"])
+def test_faces_that_use_a_vertex_twice_go_and_the_others_are_mended(package, name):
+    """Blender's own commands go round such faces for ever, and so does Edit Mode."""
+    points = np.random.default_rng(0).random((10, 3))
+    obj = scenes.add(points, [(6, 4, 1, 4), (5, 1, 7, 9, 9), (3, 4, 1, 6), (1, 4, 6), (0, 0, 2)])
+    count = getattr(package("blender.clean"), name)(obj)
+    left = [sorted(p.vertices) for p in obj.data.polygons]
+    assert left == [[1, 3, 4, 6], [1, 4, 6]]
+    assert count == {"merge": 0, "dissolve": 3}.get(name, count) and len(obj.data.vertices) == 10

@@ -230,6 +230,7 @@ SOME = {
     "compare @in.blend @other.blend --beltrami --samples 9": "Leave them out",
     "compare @in.blend @other.blend --shape-key Smile": "--beltrami. Give both",
     "measure @in.blend --shape-key Smile": "--beltrami. Give both",
+    "measure @in.blend --histogram #h.png --preview #p.png --regions nowhere": "Paint or assign one",
     "measure @in.blend --beltrami --regions groups": "Leave --regions out",
     "distance @two.blend @in.blend --markers 0,1": "Choose it by --object",
     "distance @in.blend @other.blend --markers 0,900": "no vertex 900",

@@ -162,15 +162,20 @@ def told(folder: Path, run, capfd) -> Iterator[tuple[str, object]]:
         why, lines = twin_scenes.told(capfd, name, arguments)
         rows = [row for row in (summary.summary.rows if summary.summary else ()) if row[0] != "Time"]
         yield f"{name} {objects} {list(arguments.values())}", [why, lines, rows, left()]
+    yield from commanded(folder, run, capfd, COMMANDS)
+
+
+def commanded(folder: Path, run, capfd, commands) -> Iterator[tuple[str, object]]:
+    """Names of runs of commands, as `COMMANDS` has them, and what each printed, wrote and left."""
     there = folder / "commands"
     given = {path: path.read_bytes() for path in there.iterdir() if path.is_file()}
-    for name, files, more in COMMANDS:
+    for name, files, more in commands:
         for file in files:
             for path in there.iterdir():
                 if path.is_file() and path not in given:
                     path.unlink()
             words = [*command_runs.words(name, there, file), *more.split()]
-            if file.startswith("plain"):
+            if file.startswith(("plain", "made")):
                 suffix = Path(file).suffix
                 words = [w.with_suffix(suffix) if isinstance(w, Path) and w.stem == "out" else w for w in words]
             scenes.open_empty()

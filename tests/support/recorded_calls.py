@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
 import copy
 import dataclasses
 import functools
 import importlib
 import inspect
+import itertools
 import pkgutil
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
@@ -66,10 +68,17 @@ def leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
                 yield from leaves(getattr(value, field.name), depth + 1)
 
 
-def told_leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
-    """Leaves as above of what is told as well: the letters of texts without paths, and the numbers in them."""
+def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndarray]:
+    """Leaves as above of what is told as well: the letters of texts without paths, and the numbers in them;
+    those of errors, too, if asked for."""
     if isinstance(value, Enum):
         value = value.value
+    if errors and isinstance(value, BaseException):
+        # What others say differs from version to version.
+        own = type(value).__module__.startswith(omt_uv.__name__) and value.__cause__ is None
+        value = f"{type(value).__name__}: {value if own else ''}"
+    elif isinstance(value, argparse.Namespace):
+        value = vars(value)
     if value is None or isinstance(value, Path):
         yield np.asarray(-1.0)
     elif isinstance(value, str):
@@ -81,15 +90,15 @@ def told_leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
     elif isinstance(value, (tuple, list, set, frozenset)) and depth < 6:
         yield np.asarray(len(value))
         for item in sorted(value, key=repr) if isinstance(value, (set, frozenset)) else value:
-            yield from told_leaves(item, depth + 1)
+            yield from told_leaves(item, depth + 1, errors)
     elif isinstance(value, dict) and depth < 6:
         for key, item in value.items():
             if key != "seconds":
-                yield from told_leaves([key, item], depth + 1)
+                yield from told_leaves([key, item], depth + 1, errors)
     elif dataclasses.is_dataclass(value) and not isinstance(value, type) and depth < 6:
         for field in dataclasses.fields(value):
             if not field.name.startswith("_") and field.name != "seconds":
-                yield from told_leaves(getattr(value, field.name), depth + 1)
+                yield from told_leaves(getattr(value, field.name), depth + 1, errors)
     else:
         yield from leaves(value, depth)
 
@@ -184,9 +193,14 @@ class Record:
         if call is not None and not same((call.args[is_method:], call.kwargs), (args[is_method:], kwargs)):
             self.changed[call.name] = call.function
 
+    def way(self, call: Call | None, value, k: int) -> None:
+        """What a call tells before its end, and why it breaks off, is not kept."""
+
 
 class Told(Record):
     """Figures of what comes of the first calls of every function in each run, and how many there are."""
+
+    errors = False
 
     def __init__(self, most: int) -> None:
         super().__init__(most)
@@ -211,9 +225,34 @@ class Told(Record):
     def add(self, name: str, value, k: int = 1) -> None:
         """Add the figures of a value to those of a name."""
         # Of pictures and the like some numbers stand for all.
-        found = [leaf.ravel()[:: 1 + leaf.size // SAMPLED] for leaf in told_leaves(value)]
+        found = [leaf.ravel()[:: 1 + leaf.size // SAMPLED] for leaf in told_leaves(value, errors=self.errors)]
         own = np.array([1.0, *figures(found)]) * (1 + 0.1 * (k - 1))
         self.figures[name] = self.figures.get(name, np.zeros(3)) + own
+
+
+# What stands behind names of what is given, and of what is told before the end.
+GIVEN = " given"
+ON_THE_WAY = " on the way"
+# So much of the way is counted.
+STEPS = 60
+
+
+class Within(Told):
+    """As `Told`, and what every function is given, what it tells on the way, and why it refuses."""
+
+    errors = True
+
+    def begin(self, name: str, function: Callable, args: tuple, kwargs: dict) -> Call | None:
+        """A call that begins: what it is given is counted; None if nothing is."""
+        call = super().begin(name, function, args, kwargs)
+        if call is not None:
+            self.add(name + self._mark + GIVEN, [args, kwargs], call.args[0])
+        return call
+
+    def way(self, call: Call | None, value, k: int) -> None:
+        """Add the figures of what a call tells before its end, or of the error by which it ends."""
+        if call is not None and k <= STEPS:
+            self.add(call.name + self._mark + ON_THE_WAY, value, call.args[0] + k)
 
 
 # How exact figures are told to be, at best and at worst.
@@ -244,13 +283,34 @@ def unlike(lines: list[str], rows: dict[str, np.ndarray]) -> Iterator[str]:
             yield line
 
 
+def _listened(record: Record, call: Call | None, steps: Generator) -> Generator:
+    """The same steps, of which a record hears."""
+    resume = functools.partial(next, steps)
+    for k in itertools.count():
+        try:
+            step = resume()
+        except StopIteration as stop:
+            return stop.value
+        except Exception as error:
+            record.way(call, error, k)
+            raise
+        record.way(call, step, k)
+        try:
+            resume = functools.partial(steps.send, (yield step))
+        except GeneratorExit:
+            steps.close()
+            raise
+        except BaseException as error:  # noqa: BLE001, whatever comes goes on to them
+            resume = functools.partial(steps.throw, error)
+
+
 def _watched(record: Record, name: str, function: Callable, is_method: bool) -> Callable:
     if inspect.isgeneratorfunction(function):
 
         @functools.wraps(function)
         def steps(*args, **kwargs):
             call = record.begin(name, function, args, kwargs)
-            found = yield from function(*args, **kwargs)
+            found = yield from _listened(record, call, function(*args, **kwargs))
             record.end(call, args, kwargs, found, is_method)
             return found
 
@@ -259,7 +319,11 @@ def _watched(record: Record, name: str, function: Callable, is_method: bool) -> 
     @functools.wraps(function)
     def plain(*args, **kwargs):
         call = record.begin(name, function, args, kwargs)
-        found = function(*args, **kwargs)
+        try:
+            found = function(*args, **kwargs)
+        except Exception as error:
+            record.way(call, error, 0)
+            raise
         record.end(call, args, kwargs, found, is_method)
         return found
 
@@ -300,11 +364,21 @@ def watching(record: Record, everything: list, private: bool = False) -> Iterato
             if inspect.isfunction(value) and value in watched:
                 before.append((module, attribute, value))
                 setattr(module, attribute, watched[value])
+    tables = [value for module in everything * private for value in vars(module).values() if type(value) is dict]
+    kept = [(table, key, value) for table in tables for key, value in table.items() if _is_one_of(value, watched)]
+    for table, key, value in kept:
+        table[key] = watched[value]
     try:
         yield
     finally:
         for owner, attribute, value in before:
             setattr(owner, attribute, value)
+        for table, key, value in kept:
+            table[key] = value
+
+
+def _is_one_of(value, watched: dict) -> bool:
+    return inspect.isfunction(value) and value in watched
 
 
 def names_of(module) -> list[str]:
