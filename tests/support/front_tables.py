@@ -14,6 +14,7 @@ import recorded_calls
 import scenes
 import windows
 
+ROOT = Path(__file__).resolve().parents[2]
 ACCEPT = os.environ.get("OMT_UV_ACCEPT", "")
 # Calls of each function in a run that are counted.
 MOST = 20
@@ -42,6 +43,8 @@ class Rounds:
             self.patch.context() as patch,
         ):
             patch.chdir(folder)
+            # Processes of ours are begun there.
+            patch.setenv("PYTHONPATH", str(ROOT))
             for name, left in self._told(folder, run, patch):
                 record.next_run()
                 record.add(name, left)

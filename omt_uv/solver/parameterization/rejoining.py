@@ -31,9 +31,9 @@ SHORT = 0.05
 SHEARED = 0.95
 # Cuts have to become shorter by this share of the border, since the rest of it may have to be cut again.
 SAVED = 0.5
-# So many joints are tried at most, and no more is mapped for them than this many times all charts.
+# So many joints are tried at most, and no more vertices are mapped for them than this, or than all charts have.
 MOST_TRIALS = 6
-MOST_MAPPED = 4.0
+MOST_MAPPED = 60_000
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def rejoined(
     """
     sides, count = np.unique(np.concatenate([np.unique(outline(one)) for one in begun.charts]), return_counts=True)
     between, tried = sides[count > 1], set[bytes]()
-    mapped, all_vertices = 0, sum(len(chart.vertices) for chart in last.charts)
+    left = max(MOST_MAPPED, sum(len(chart.vertices) for chart in last.charts))
     for trial in range(MOST_TRIALS):
         if last.excess or last.searched or len(last.charts) < 2:
             break
@@ -68,8 +68,8 @@ def rejoined(
             break
         both = _with_image(max(chosen, key=lambda one: one.width), borders, last.charts, search.images)
         tried |= {_key(one) for one in both}
-        mapped += sum(len(last.charts[k].vertices) for k in frozenset().union(*(one.charts for one in both)))
-        if mapped > MOST_MAPPED * all_vertices:
+        size = sum(len(last.charts[k].vertices) for k in frozenset().union(*(one.charts for one in both)))
+        if size > left:
             break
         gone = np.concatenate([pair_keys(*one.edges.T) for one in both])
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), gone)]
@@ -81,6 +81,7 @@ def rejoined(
             continue
         if new is None:
             break
+        left -= 0 if new is last else size
         last = new if _is_sound(search, last, new) else last
     return last
 

@@ -121,9 +121,14 @@ def test_a_first_mesh_is_relaxed_brought_to_its_count_and_fitted(fit, rounds, mo
     )
     start = SimpleNamespace(size=0.5, mesh=mesh, vertex_count=9, to_reopen=None, warnings=("told",))
     options = SimpleNamespace(rounds=rounds, fit=fit)
-    found = drain(components._settled(component, start, np.ones(8), options, False))
+    asked = []
+    monkeypatch.setattr(components, "_too_thin", lambda *words: (asked.append(words), ["thin"])[1])
+    found = drain(components._settled(component, start, np.full(8, 4.0), options, False))
     assert calls == ["relax"] * (rounds > 0) + ["reach"] + ["fit"] * fit + ["reopen"]
-    assert found.residual == (0.25 if rounds else 0.0) and found.warnings == ("told",)
+    assert found.residual == (0.25 if rounds else 0.0) and found.warnings == ("told", "thin")
+    # Edges are half as long where the density is four times as high.
+    ((of, points, edge),) = asked
+    assert of is component and points is V and edge.tolist() == [0.25] * 8
     rows = found.faces - 10
     assert found.points == pytest.approx(V - component.shift[rows])
     on = np.einsum("kc,kcd->kd", found.barycentric, component.vertices[F[rows]])
