@@ -19,7 +19,16 @@ ACCEPT = os.environ.get("OMT_UV_ACCEPT", "")
 # Calls of each function in a run that are counted.
 MOST = 20
 # What hangs on the clock, and on the machine and who works on it.
-ELSEWHERE = ("supervision.", "batch.", "session.live.", "session.following.", "operators.live.", "table ", "summary ")
+ELSEWHERE = (
+    "supervision.",
+    "batch.",
+    "session.run.",
+    "session.live.",
+    "session.following.",
+    "operators.live.",
+    "table ",
+    "summary ",
+)
 
 
 class Rounds:
