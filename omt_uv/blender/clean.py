@@ -7,57 +7,66 @@ from collections.abc import Callable
 import bpy
 
 import bmesh
+import numpy as np
+
+from ..solver.errors import RepeatedVertexError
 
 # Vertices closer than this share of the extent lie on one another.
 TOGETHER = 1e-6
 
 
 def turn_outside(obj: bpy.types.Object) -> int:
-    """Turn faces over until all look outside; how many were turned."""
-    return _changed(obj, _turn)[0]
+    """Turn faces over until all look outside; how many were turned. Faces: see `check_faces`."""
+    return _changed(obj, _turn)
 
 
 def merge(obj: bpy.types.Object) -> int:
-    """Join vertices that lie on one another; how many went."""
-    return _changed(obj, _merge)[0]
+    """Join vertices that lie on one another; how many went. Faces: see `check_faces`."""
+    return _changed(obj, _merge)
 
 
 def dissolve(obj: bpy.types.Object) -> int:
-    """Dissolve faces without area and edges without length; how many vertices and faces went."""
-    return sum(_changed(obj, _dissolve))
+    """Dissolve faces without area and edges without length, and take away faces that use a vertex twice; how many
+    vertices and faces went."""
+    count = 0
+    if obj.mode != "EDIT" and _repeating(obj):
+        count = len(obj.data.polygons)
+        # As is everything that Blender holds for invalid.
+        obj.data.validate()
+        count -= len(obj.data.polygons)
+    return count + _changed(obj, _dissolve)
 
 
-def _changed(obj: bpy.types.Object, change: Callable[[bmesh.types.BMesh, float], int]) -> tuple[int, int]:
-    """Change a mesh: what the change says it did, and how many faces went before that no change can be made with."""
+def check_faces(obj: bpy.types.Object) -> None:
+    """Raise RepeatedVertexError for faces that use a vertex twice: Blender's commands never come to the end of them."""
+    repeating = _repeating(obj) if obj.mode != "EDIT" else []
+    if repeating:
+        raise RepeatedVertexError("A face uses a vertex twice", kind="face", elements=np.array(repeating))
+
+
+def _repeating(obj: bpy.types.Object) -> list[int]:
+    """The indices of faces that use a vertex twice."""
+    return [face.index for face in obj.data.polygons if len(set(face.vertices)) < len(face.vertices)]
+
+
+def _changed(obj: bpy.types.Object, change: Callable[[bmesh.types.BMesh, float], int]) -> int:
     mesh = obj.data
     extent = max(obj.dimensions) / max(1e-30, max(map(abs, obj.matrix_world.to_scale())))
     if obj.mode == "EDIT":
         edit = bmesh.from_edit_mesh(mesh)
         count = change(edit, extent)
         bmesh.update_edit_mesh(mesh)
-        return count, 0
+        return count
     edit = bmesh.new()
     try:
         edit.from_mesh(mesh)
-        left_out = _leave_out_invalid(edit, mesh)
         count = change(edit, extent)
         if count:
             edit.to_mesh(mesh)
             mesh.update()
     finally:
         edit.free()
-    return count, left_out
-
-
-def _leave_out_invalid(edit: bmesh.types.BMesh, mesh: bpy.types.Mesh) -> int:
-    """Take away faces that use a vertex twice, which Blender's commands never come to the end of; how many went."""
-    if all(len(set(face.verts)) == len(face.verts) for face in edit.faces):
-        return 0
-    edit.clear()
-    count = len(mesh.polygons)
-    mesh.validate()
-    edit.from_mesh(mesh)
-    return count - len(mesh.polygons)
+    return count
 
 
 def _turn(edit: bmesh.types.BMesh, _extent: float) -> int:

@@ -185,12 +185,26 @@ def test_a_picture_of_a_checker_stands_the_right_way_up(package):
     assert mine in [slot.material for slot in obj.material_slots] or not obj.material_slots
 
 
-@pytest.mark.parametrize("name", ["merge", "dissolve", "turn_outside"])
-def test_faces_that_use_a_vertex_twice_go_and_the_others_are_mended(package, name):
-    """Blender's own commands go round such faces for ever, and so does Edit Mode."""
+def with_faces_that_use_a_vertex_twice():
     points = np.random.default_rng(0).random((10, 3))
-    obj = scenes.add(points, [(6, 4, 1, 4), (5, 1, 7, 9, 9), (3, 4, 1, 6), (1, 4, 6), (0, 0, 2)])
-    count = getattr(package("blender.clean"), name)(obj)
+    return scenes.add(points, [(6, 4, 1, 4), (5, 1, 7, 9, 9), (3, 4, 1, 6), (1, 4, 6), (0, 0, 2)])
+
+
+def test_faces_that_use_a_vertex_twice_are_dissolved(package):
+    """Blender's own commands go round such faces for ever, and so does Edit Mode."""
+    obj = with_faces_that_use_a_vertex_twice()
+    assert package("blender.clean").dissolve(obj) == 3
     left = [sorted(p.vertices) for p in obj.data.polygons]
-    assert left == [[1, 3, 4, 6], [1, 4, 6]]
-    assert count == {"merge": 0, "dissolve": 3}.get(name, count) and len(obj.data.vertices) == 10
+    assert left == [[1, 3, 4, 6], [1, 4, 6]] and len(obj.data.vertices) == 10
+    assert package("blender.clean").dissolve(obj) == 0
+
+
+@pytest.mark.parametrize("action", ["MERGE", "NORMALS"])
+def test_what_would_go_round_such_faces_is_refused_and_nothing_is_mended(package, action):
+    """Of two objects the second has them: the first is as it was, too, and the error names faces and what helps."""
+    good = scenes.add(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.0]]), [(0, 1, 2), (3, 2, 1)])
+    bad = with_faces_that_use_a_vertex_twice()
+    scenes.select([good, bad])
+    told = scenes.error_of(bpy.ops.uv.omt_remedy, action=action)
+    assert f"{bad.name}: A face uses a vertex twice (3 faces: 0, 1, 4). Use Degenerate Dissolve." in told
+    assert len(good.data.vertices) == 4 and len(good.data.polygons) == 2 and len(bad.data.polygons) == 5

@@ -131,18 +131,19 @@ def test_what_is_better_is_so_by_a_thousandth(share, taken, written, monkeypatch
 def test_the_leaf_that_is_worth_least_is_taken_back_first_then_some_at_random(in_vain, written):
     leaves = [np.array(x) for x in ((0, 1), (2,), (3, 4))]
     losses = {(0, 1): [0.1, 0.9], (2,): [0.2], (3, 4): [0.1, 0.3]}
-    written(losses=losses)
+    written([leaf.tolist() for leaf in leaves], losses=losses)
     given = task(cost=[1, 1, 1, 2, 2, 1])
     cut = written.along(given, np.arange(6))
+    found, order = improvement._leaves_by_worth(given, cut)
     # 0.9 for 2, 0.2 for 1, 0.3 for 4.
-    found = improvement._taken_back(given, cut, leaves, in_vain, np.random.default_rng(0))
-    order = [(3, 4), (2,), (0, 1)]
+    assert [tuple(found[k].tolist()) for k in order] == [(3, 4), (2,), (0, 1)]
+    gone = improvement._taken_back(found, order, in_vain, np.random.default_rng(0))
     if in_vain < 3:
-        assert found.steps.tolist() == [k for k in range(6) if k not in order[in_vain]]
+        assert [leaf.tolist() for leaf in gone] == [found[order[in_vain]].tolist()]
     else:
         chosen = np.random.default_rng(0).random(3) < 0.4
-        gone = {s for leaf, c in zip(leaves, chosen, strict=True) if c for s in leaf.tolist()} or {3, 4}
-        assert found.steps.tolist() == [k for k in range(6) if k not in gone]
+        random = [leaf.tolist() for leaf, c in zip(leaves, chosen, strict=True) if c]
+        assert [leaf.tolist() for leaf in gone] == (random or [[3, 4]])
 
 
 @pytest.mark.parametrize(
@@ -155,18 +156,25 @@ def test_the_leaf_that_is_worth_least_is_taken_back_first_then_some_at_random(in
 )
 def test_trials_are_kept_where_they_are_better_within_the_bound(outcomes, written, monkeypatch):
     asked, rest = [], list(outcomes)
-    monkeypatch.setattr(improvement, "leaves", lambda graph, steps: ["leaf"])
-    monkeypatch.setattr(improvement, "_taken_back", lambda task, cut, found, in_vain, rng: asked.append(in_vain))
-    monkeypatch.setattr(improvement, "grow", lambda task, base, most: most)
-    monkeypatch.setattr(improvement, "rerouted", lambda task, cut: cut)
 
-    def trimmed(task, most):
+    def taken(found, order, in_vain, rng):
+        asked.append(in_vain)
+        return [np.array([len(asked)])]
+
+    def grow(task, base, most):
         assert most == 12
-        spread, cost, _ = rest.pop(0)
-        return Cut(np.arange(3), spread, cost)
+        return base
 
+    def trimmed(task, grown):
+        spread, cost, _ = rest.pop(0)
+        return Cut(np.arange(12), spread, cost)
+
+    written([[0]], losses={(0,): [0.1]})
+    monkeypatch.setattr(improvement, "_taken_back", taken)
+    monkeypatch.setattr(improvement, "grow", grow)
+    monkeypatch.setattr(improvement, "rerouted", lambda task, cut: cut)
     monkeypatch.setattr(improvement, "trimmed", trimmed)
-    first = Cut(np.arange(3), 0.95, 10.0)
+    first = Cut(np.arange(12), 0.95, 10.0)
     found = list(improvement.improved(task(1.0), first, len(outcomes)))
     best, vain, want = first, 0, []
     for (spread, cost, better), one in zip(outcomes, found, strict=True):
@@ -176,9 +184,30 @@ def test_trials_are_kept_where_they_are_better_within_the_bound(outcomes, writte
     assert asked == want
     # A cut that is beyond the bound already may be as far beyond.
     rest[:] = [(1.4, 5.0, True)]
-    assert next(improvement.improved(task(1.0), Cut(np.arange(3), 1.5, 10.0), 1)).cost == 5.0
+    assert next(improvement.improved(task(1.0), Cut(np.arange(12), 1.5, 10.0), 1)).cost == 5.0
     monkeypatch.setattr(improvement, "leaves", lambda graph, steps: [])
     assert list(improvement.improved(task(1.0), first, 4)) == []
+
+
+def test_what_the_same_leaves_or_the_same_growth_come_to_is_found_once(written, monkeypatch):
+    taken, counts = [[1], [1], [2], [1, 2]], {"grow": 0, "trimmed": 0}
+    written([[0]], losses={(0,): [0.1]})
+
+    def grow(task, base, most):
+        counts["grow"] += 1
+        # Without one as without the other.
+        return Cut(np.setdiff1d(base.steps, [1, 2]))
+
+    def trimmed(task, grown):
+        counts["trimmed"] += 1
+        return Cut(grown.steps, 0.9, 20.0)
+
+    monkeypatch.setattr(improvement, "_taken_back", lambda *_: [np.array(taken.pop(0))])
+    monkeypatch.setattr(improvement, "grow", grow)
+    monkeypatch.setattr(improvement, "rerouted", lambda task, cut: cut)
+    monkeypatch.setattr(improvement, "trimmed", trimmed)
+    found = list(improvement.improved(task(1.0), Cut(np.arange(12), 0.95, 10.0), 4))
+    assert [one.cost for one in found] == [10.0] * 4 and counts == {"grow": 3, "trimmed": 1}
 
 
 # ---- islands ------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -140,6 +141,13 @@ def prepare(folder: Path, run) -> None:
     bpy.ops.export_scene.gltf(filepath=str(there / "plain.glb"))
 
 
+def _text(path: Path):
+    """What a file says, a report by its keys, of which seconds are let be; None for what is no text."""
+    if path.suffix not in TEXTS:
+        return None
+    return json.loads(path.read_text()) if path.suffix == ".json" else path.read_text()
+
+
 def left() -> dict:
     """All that twins compare, as texts and numbers that go on where a value changes a little."""
     found = {}
@@ -182,7 +190,7 @@ def commanded(folder: Path, run, capfd, commands) -> Iterator[tuple[str, object]
             capfd.readouterr()
             status, printed = run(*words), list(capfd.readouterr())
             written = sorted(path for path in there.iterdir() if path.is_file() and path not in given)
-            texts = [path.read_text() if path.suffix in TEXTS else None for path in written]
+            texts = [_text(path) for path in written]
             if status == 0 and (there / "out.blend").exists():
                 bpy.ops.wm.open_mainfile(filepath=str(there / "out.blend"))
             yield f"{name} {file} {more}".strip(), [status, printed, written, texts, left()]

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty
 from ...remedies import ACTIONS
 from ...session import last_run
 from ...session.language import counted, words
-from ..base import Complaint, QuickOperator, check_all_local
+from ..base import Complaint, QuickOperator, check_all_local, complaints
 
 UNWRAP = "uv.omt_unwrap"
 
@@ -49,6 +49,9 @@ class UV_OT_omt_remedy(QuickOperator, bpy.types.Operator):
         check_all_local([(obj, None) for obj in objects])
         if self.action == "APPLY_LEVEL" and (reason := subdivision.why_not_applied(objects)):
             raise Complaint(reason)
+        for obj in objects if self.action in ("NORMALS", "MERGE") else ():
+            with complaints(about=obj):
+                clean.check_faces(obj)
         count = sum(mend(obj) for obj in objects)
         said = {
             "NORMALS": ("Turned {} face over", "Turned {} faces over"),
