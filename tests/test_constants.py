@@ -6,15 +6,9 @@ import ast
 import importlib
 from pathlib import Path
 
-from kept import check
+from kept import ROOT, check, modules
 
 TABLE = Path(__file__).with_name("constants.tsv")
-ROOT = Path(__file__).resolve().parents[1]
-MODULES = [
-    ".".join(p.relative_to(ROOT).with_suffix("").parts)
-    for p in sorted((ROOT / "omt_uv").glob("**/*.py"))
-    if not p.stem.startswith("__") and "presets" not in p.parts
-]
 # What hangs on the system and on the version of Blender.
 ELSEWHERE = {"OF_SYSTEM", "MEMORY_IS_LIMITED", "SIGNALS", "SMOOTH_COLOUR_SHADER", "UNIFORM_COLOUR_SHADER"}
 # Longer texts have tests of their own that ask for their words.
@@ -51,7 +45,7 @@ def words(value):
 
 def rows():
     """A line of each constant."""
-    for module in MODULES:
+    for module in modules():
         tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text())
         there = importlib.import_module(module)
         for owner, prefix, body in [

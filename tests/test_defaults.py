@@ -7,15 +7,9 @@ import importlib
 import inspect
 from pathlib import Path
 
-from kept import check, plain
+from kept import check, modules, plain
 
 TABLE = Path(__file__).with_name("defaults.tsv")
-ROOT = Path(__file__).resolve().parents[1]
-MODULES = [
-    ".".join(p.relative_to(ROOT).with_suffix("").parts)
-    for p in sorted((ROOT / "omt_uv").glob("**/*.py"))
-    if not p.stem.startswith("__") and "presets" not in p.parts
-]
 
 
 def words(default):
@@ -53,7 +47,7 @@ def rows(module, name, value):
 
 def test_what_is_taken_where_nothing_is_given_is_that_of_the_table():
     lines = []
-    for module in MODULES:
+    for module in modules():
         for name, value in sorted(vars(importlib.import_module(module)).items()):
             if getattr(value, "__module__", "") == module:
                 lines += rows(module, name, value)

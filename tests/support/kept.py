@@ -8,6 +8,17 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def modules() -> list[str]:
+    """Names of all modules of the package that may be imported one by one."""
+    return [
+        ".".join(p.relative_to(ROOT).with_suffix("").parts)
+        for p in sorted((ROOT / "omt_uv").glob("**/*.py"))
+        if not p.stem.startswith("__") and "presets" not in p.parts
+    ]
+
 
 def check(path: Path, lines: list[str]) -> None:
     """Compare lines with those of a file, which is written where that is asked for.

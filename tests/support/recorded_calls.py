@@ -361,7 +361,7 @@ def watching(record: Record, everything: list, private: bool = False) -> Iterato
                 setattr(owner, attribute, _watched(record, name, function, True))
     for module in everything:
         for attribute, value in list(vars(module).items()):
-            if inspect.isfunction(value) and value in watched:
+            if _is_one_of(value, watched):
                 before.append((module, attribute, value))
                 setattr(module, attribute, watched[value])
     tables = [value for module in everything * private for value in vars(module).values() if type(value) is dict]

@@ -56,8 +56,7 @@ def rejoined(
     begun : the round that this one came of: what parts its charts stays; cut : a round cut along edges (e,2) alone, and
     what they need to be disks; as it is where that is longer than so much, None where the end was asked for
     """
-    sides, count = np.unique(np.concatenate([np.unique(outline(one)) for one in begun.charts]), return_counts=True)
-    between, tried = sides[count > 1], set[bytes]()
+    between, tried = _between(begun.charts)[0], set[bytes]()
     left = max(MOST_MAPPED, sum(len(chart.vertices) for chart in last.charts))
     for trial in range(MOST_TRIALS):
         if last.excess or last.searched or len(last.charts) < 2:
@@ -93,14 +92,9 @@ def _key(border: Border) -> bytes:
 
 def _borders(search: ShearSearch, last: Round, between: np.ndarray) -> list[Border]:
     """The longest border of every two charts that share what was cut, but for edges with keys `between` (k,)."""
-    outlines = [outline(chart) for chart in last.charts]
-    key, owner = np.concatenate(outlines), np.repeat(np.arange(len(outlines)), [len(one) for one in outlines])
-    order = np.lexsort((owner, key))
-    key, owner = key[order], owner[order]
-    both = np.flatnonzero(key[1:] == key[:-1])
-    key, charts = key[both], np.stack([owner[both], owner[both + 1]], axis=1)
+    key, charts = _between(last.charts)
     cut = np.isin(key, pair_keys(*last.cuts.edges.T)) & ~np.isin(key, between)
-    key, charts = (x[cut & (charts[:, 0] != charts[:, 1])] for x in (key, charts))
+    key, charts = key[cut], charts[cut]
     edges, pair = paired(key), np.unique(pair_keys(*charts.T), return_inverse=True)[1].ravel()
     # Runs of edges that hang together, of every two charts by themselves.
     nodes, end = np.unique(pair[:, None] * len(search.surface.positions) + edges, return_inverse=True)
@@ -113,6 +107,16 @@ def _borders(search: ShearSearch, last: Round, between: np.ndarray) -> list[Bord
         if two not in found:
             found[two] = Border(two, edges[run == k], float(length[k]), float(length[k] / side[list(two)].min()))
     return list(found.values())
+
+
+def _between(charts: list[Chart]) -> tuple[np.ndarray, np.ndarray]:
+    """Keys (k,) of the edges between two charts, and the numbers of these (k,2), the lower first."""
+    outlines = [outline(chart) for chart in charts]
+    key, owner = np.concatenate(outlines), np.repeat(np.arange(len(outlines)), [len(one) for one in outlines])
+    order = np.lexsort((owner, key))
+    key, owner = key[order], owner[order]
+    both = np.flatnonzero((key[1:] == key[:-1]) & (owner[1:] != owner[:-1]))
+    return key[both], np.stack([owner[both], owner[both + 1]], axis=1)
 
 
 def _may_join(last: Round, border: Border) -> bool:
