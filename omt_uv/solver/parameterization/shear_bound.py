@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,10 +21,10 @@ from .shear_search import (
     MARGIN,
     MOST_STEEP,
     NEARLY,
+    NO_EDGES,
     NO_EXCESS,
     STEEP,
     UNSHEARED,
-    Asked,
     Round,
     ShearSearch,
     joined,
@@ -68,6 +68,35 @@ SEARCHING = 0.25
 PARTING = 0.3
 # Charts that are joined again, at the end.
 JOINING = 0.05
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Numbers of charts to be cut anew for a spread (f,), the edges (k,2) that stay cut all the same, what changes in
+    the search, whether edges (k,2) that it comes to are worth a map, and the slits (s,2) that are made again."""
+
+    charts: list[int]
+    kept: np.ndarray
+    spread: np.ndarray
+    changes: dict[str, Any]
+    is_worth: Callable[[np.ndarray], bool]
+    slits: np.ndarray = field(default_factory=lambda: NO_EDGES)
+
+    @staticmethod
+    def of(
+        last: Round,
+        missed: list[int],
+        apart: dict[int, np.ndarray],
+        flat: list[int],
+        spread: np.ndarray,
+        changes: dict[str, Any],
+        tried: set[bytes],
+    ) -> Asked:
+        """What is asked of charts of a round that missed the bound, and of what is left of those that come apart around
+        flat sides; worth a map is what was not tried."""
+        chosen = [*missed, *flat]
+        kept = [but_within(last.kept(missed), [last.charts[k] for k in flat]), *apart.values()]
+        return Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
 
 
 @dataclass(frozen=True)

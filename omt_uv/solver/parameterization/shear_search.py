@@ -23,7 +23,7 @@ from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_edges, boundary_loops, pair_keys
 from ..progress import Steps, part_of
-from .chart_indices import all_within, but_within, edge_set, identity, is_marked, outline
+from .chart_indices import all_within, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
@@ -409,35 +409,6 @@ class Round:
         missing, then = (float(each.area[each.searched].sum()) for each in (self, before))
         is_as_much = self.excess > (1 - LITTLE) * before.excess and missing > (1 - LITTLE) * then
         return is_as_much and self.excess > NEARLY * self.bound
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Numbers of charts to be cut anew for a spread (f,), the edges (k,2) that stay cut all the same, what changes in
-    the search, whether edges (k,2) that it comes to are worth a map, and the slits (s,2) that are made again."""
-
-    charts: list[int]
-    kept: np.ndarray
-    spread: np.ndarray
-    changes: dict[str, Any]
-    is_worth: Callable[[np.ndarray], bool]
-    slits: np.ndarray = field(default_factory=lambda: NO_EDGES)
-
-    @staticmethod
-    def of(
-        last: Round,
-        missed: list[int],
-        apart: dict[int, np.ndarray],
-        flat: list[int],
-        spread: np.ndarray,
-        changes: dict[str, Any],
-        tried: set[bytes],
-    ) -> Asked:
-        """What is asked of charts of a round that missed the bound, and of what is left of those that come apart around
-        flat sides; worth a map is what was not tried."""
-        chosen = [*missed, *flat]
-        kept = [but_within(last.kept(missed), [last.charts[k] for k in flat]), *apart.values()]
-        return Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
 
 
 def pressing_shear(mean: float, steep: float, bound: float) -> float:
