@@ -67,11 +67,11 @@ def rejoined(
             break
         both = _with_image(max(chosen, key=lambda one: one.width), borders, last.charts, search.images)
         tried |= {_key(one) for one in both}
-        size = sum(len(last.charts[k].vertices) for k in frozenset().union(*(one.charts for one in both)))
+        among = [last.charts[k] for k in frozenset().union(*(one.charts for one in both))]
+        size = sum(len(chart.vertices) for chart in among)
         if size > left:
             break
-        gone = np.concatenate([pair_keys(*one.edges.T) for one in both])
-        kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), gone)]
+        kept = _without(last.cuts.edges, np.concatenate([pair_keys(*one.edges.T) for one in both]), among)
         most = last.cuts.length - SAVED * sum(one.length for one in both)
         try:
             new = yield from part_of(cut(last, kept, most), trial / MOST_TRIALS, 1 / MOST_TRIALS)
@@ -83,6 +83,21 @@ def rejoined(
         left -= 0 if new is last else size
         last = new if _is_sound(search, last, new) else last
     return last
+
+
+def _without(edges: np.ndarray, gone: np.ndarray, charts: list[Chart]) -> np.ndarray:
+    """Edges (e,2) without those with keys `gone` (g,), across which charts join, and without what was cut between or
+    within these and hung on nothing else: a slit that floats in a chart opens nothing."""
+    key, count = np.unique(np.concatenate([outline(chart) for chart in charts]), return_counts=True)
+    rim, inner = key[count == 1], np.setdiff1d(key[count > 1], gone)
+    ends = paired(np.concatenate([rim, inner]))
+    nodes, end = np.unique(ends, return_inverse=True)
+    one, other = end.reshape(-1, 2).T
+    run = graph_components(one, other, len(nodes))[1][one]
+    # What is whole has no rim: the most that hangs together is what opens it.
+    anchored = run[: len(rim)] if len(rim) else np.bincount(run).argmax(keepdims=True) if len(run) else run
+    floating = inner[~np.isin(run[len(rim) :], anchored)]
+    return edges[~np.isin(pair_keys(*edges.T), np.concatenate([gone, floating]))]
 
 
 def _key(border: Border) -> bytes:

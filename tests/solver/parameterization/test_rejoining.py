@@ -15,6 +15,7 @@ from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import boundary_edges, pair_keys
 from omt_uv.solver.parameterization import rejoining
 from omt_uv.solver.parameterization.chart_indices import edge_set
 from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
@@ -95,6 +96,34 @@ def test_of_two_borders_that_are_images_both_go_or_neither_does():
     asked = []
     joined_again(square(n), round_of(square(n), edges), asked=asked)
     assert len(asked) == 2
+
+
+def test_a_slit_goes_with_the_border_it_hung_on_and_one_from_the_rim_stays():
+    search, floats, hangs = square(8), np.array([[40, 41], [41, 42]]), np.array([[26, 25], [25, 24]])
+    asked = []
+    joined_again(search, round_of(search, np.concatenate([column(8, 4), floats, hangs])), asked=asked)
+    assert asked == [edge_set(hangs)]
+
+
+def climbed(V, F, begin, steps, up):
+    """Edges (steps,2) from a vertex to where it goes most up (1) or down (-1)."""
+    ends, path = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), [begin]
+    for _ in range(steps):
+        beside = ends[ends[:, 0] == path[-1], 1]
+        path.append(int(beside[np.argmax(up * V[beside, 2])]))
+    return np.stack([path[:-1], path[1:]], axis=1)
+
+
+def test_of_a_closed_body_what_hangs_together_most_still_opens_it():
+    V, F = meshes.icosphere(2)
+    search = ShearSearch(triangle_surface(V, F), None, ShearBound(BOUND), None, {})
+    rim = boundary_edges(F[V[F].mean(axis=1)[:, 2] > 0])
+    long, short = climbed(V, F, int(rim[0, 0]), 3, 1), climbed(V, F, int(rim[-1, 0]), 2, -1)
+    edges = np.concatenate([rim, long, short])
+    charts = round_of(search, edges).charts
+    assert len(charts) == 2
+    kept = rejoining._without(edges, pair_keys(*rim.T), charts)
+    assert edge_set(kept) == edge_set(long)
 
 
 def test_what_was_apart_before_stays():
