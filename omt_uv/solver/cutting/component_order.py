@@ -84,6 +84,8 @@ def motion(first: Outlined, other: Outlined) -> tuple[np.ndarray, float] | None:
     n, sides_a, sides_b = len(first.vertices), first.sides, other.sides
     if n != len(other.vertices) or len(sides_a) != len(sides_b):
         return None
+    if np.array_equal(first.vertices, other.vertices) and np.array_equal(sides_a, sides_b):
+        return np.arange(n), 1.0
     # Squares of huge coordinates would be infinite.
     unit = float(max(np.abs(first.vertices).max(), np.abs(other.vertices).max())) or 1.0
     a, b = ((x.vertices / unit) - (x.vertices / unit).mean(axis=0) for x in (first, other))

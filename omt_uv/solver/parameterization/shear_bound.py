@@ -135,7 +135,7 @@ def bound_shear(
     """
     early, free = EarlyEnd(), crossing is not None
     begun = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
-    begun = begun.settled_where_searched() if of_pieces else begun
+    begun = begun.settled_where_searched(search, all_of_them=of_pieces)
     rounds = _further_rounds(search, begun, map_charts, crossing, map_sparing, early)
     found = yield from part_of(rounds, 0.0, 1 - JOINING)
     if not early.is_asked:
@@ -317,7 +317,8 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     parts = [
         k
         for k in np.flatnonzero(large & last.has_room).tolist()
-        if not last.found_for(k) and (search.shear.further or not is_marked(search.surface, last.charts[k]))
+        if not (last.found_for(k) or search.is_thinned(last.charts[k]))
+        and (search.shear.further or not is_marked(search.surface, last.charts[k]))
     ]
     if len(last.charts) < 2 or not parts:
         return last

@@ -73,6 +73,8 @@ class ShearSearch:
     target : see `chart_map.map_chart`
     cutting : further arguments of `disk_charts.disk_charts`
     map_surface : gives the maps of the charts of a small surface, for a target of its own
+    seams_of : gives all seams (k,2) of one, with vertices (n,) in [0,1] to keep free of them; None where large parts
+        are not to be thinned, see `thinned.ThinnedSearch`
     """
 
     surface: Surface
@@ -81,6 +83,7 @@ class ShearSearch:
     target: Target | None
     cutting: dict
     map_surface: Callable[[Surface, list[Chart], Target | None], Steps[list[ChartMap]]] | None = None
+    seams_of: Callable[[Surface, np.ndarray], Steps[np.ndarray]] | None = None
 
     def first_spread(self) -> np.ndarray:
         """The spread (f,) to begin with, see `SeamSearch`."""
@@ -88,9 +91,9 @@ class ShearSearch:
 
     def search(self, spread: np.ndarray) -> SeamSearch:
         """The search for a spread (f,)."""
-        from ..seams.search import SeamSearch
+        from .thinned import ThinnedSearch
 
-        return SeamSearch(
+        return ThinnedSearch(
             spread,
             self.surface,
             self.costs,
@@ -102,6 +105,8 @@ class ShearSearch:
             rehearse=self.rehearsed if self.shear.bound >= LEAST_REHEARSED else None,
             rehearsed=self.rehearsals,
             borders=self.borders,
+            seams_of=self.seams_of,
+            thinned=self.thinned,
         )
 
     def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
@@ -194,6 +199,15 @@ class ShearSearch:
     def borders(self) -> tuple[TurnedCopies, TurnedCopies]:
         """Where parts come apart along hard edges: later searches come to the same ones."""
         return TurnedCopies(), TurnedCopies()
+
+    @cached_property
+    def thinned(self) -> list[np.ndarray]:
+        """Polygons (k,) of parts whose seams were found on thinned surfaces, with all that was tried of maps."""
+        return []
+
+    def is_thinned(self, chart: Chart) -> bool:
+        """Whether the seams of a chart were found on a thinned surface."""
+        return any(np.isin(chart.faces[0], polygons) for polygons in self.thinned)
 
     @cached_property
     def images(self) -> MirrorImages | None:
@@ -375,10 +389,12 @@ class Round:
             [sum(closed_price(c.vertices, loop) for loop in boundary_loops(c.triangles)) for c in self.charts]
         )
 
-    def settled_where_searched(self) -> Round:
-        """The same, where charts that miss the bound keep what was cut of them and are cut further: a search of one by
-        itself would begin anew, and predicts it no better than one of the whole."""
-        return replace(self, settled=all_within([self.charts[k] for k in self.searched]))
+    def settled_where_searched(self, search: ShearSearch, all_of_them: bool) -> Round:
+        """The same, where charts that miss the bound, all of them or those of thinned surfaces, keep what was cut of
+        them and are cut further: a search of one by itself would begin anew, and predicts it no better than one of the
+        whole."""
+        chosen = [self.charts[k] for k in self.searched]
+        return replace(self, settled=all_within([one for one in chosen if all_of_them or search.is_thinned(one)]))
 
     def changes(self, rounds: int) -> dict[str, Any]:
         """What a search that is made again differs in, by the number of the round."""

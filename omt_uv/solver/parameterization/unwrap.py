@@ -230,7 +230,8 @@ def cut_charts(
     avoid = clear_of_pins(surface, pins, avoid)
     bound = options.shear_bound()
     given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
-    search = None if bound is None else ShearSearch(surface, faces, bound, target, given, rehearsal(options))
+    thinning = None if options.quality == "draft" else seams_of_small(options)
+    search = None if bound is None else ShearSearch(surface, faces, bound, target, given, rehearsal(options), thinning)
     finder = _faces_of(surface, faces, options) if search is None else search.search(search.first_spread())
     seams = OUTLINED if options.seams == "auto" and options.boundary != "free" else options.seams
     prepared = yield from disk_charts(surface, faces, seams=seams, search=finder, **given)
@@ -256,6 +257,15 @@ def rehearsal(options: UnwrapOptions) -> Callable[[Surface, list[Chart], Target 
         return (yield from _Task(surface, quick, None, target).map_charts(charts))
 
     return maps
+
+
+def seams_of_small(options: UnwrapOptions) -> Callable[[Surface, np.ndarray], Steps[np.ndarray]]:
+    """Seams of a small surface with these options, as its own maps keep the bound with them."""
+
+    def seams(surface: Surface, avoid: np.ndarray) -> Steps[np.ndarray]:
+        return (yield from unwrap(surface, options=options, avoid=avoid if avoid.any() else None)).seams
+
+    return seams
 
 
 def predicted_cuts(

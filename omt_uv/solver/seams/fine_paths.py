@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import breadth_first_order, dijkstra, minimum_spanning_tree
 
 from ..analysis.straight_paths import EdgeNetwork, edge_network, straighten
 from ..cutting.component import CutComponent
@@ -121,6 +121,50 @@ def edges_along(component: CutComponent, paths: Sequence[np.ndarray]) -> np.ndar
     """Edges (e,) bool of a component between the vertices (k,) of paths that follow each other."""
     keys = [np.zeros(0, np.int64), *(pair_keys(path[:-1], path[1:]) for path in paths)]
     return np.isin(pair_keys(*component.ends.T), np.concatenate(keys))
+
+
+def led_along(component: CutComponent, coarse: CoarseSurface, edges: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of a component along those (k,2) of a coarse surface, which may branch and close loops, as many
+    times as these do: between branchings, tips and boundaries each path is led by itself, and meets no other."""
+    fine, spacing = FineGraph.of(component), float(np.median(edge_lengths(coarse.positions, edges)))
+    chains = _chains(edges, coarse.boundary)
+    used = component.on_boundary()
+    used[coarse.kept[[end for chain in chains for end in (chain[0], chain[-1])]]] = True
+    paths = []
+    # What is short has least choice.
+    for chain in sorted(chains, key=len):
+        along, allowed, start = coarse.kept[chain], ~used, np.zeros_like(used)
+        allowed[along[[0, -1]]] = start[along[0]] = True
+        path = _led([fine], start, int(along[-1]), along, spacing, allowed, in_plane=False)
+        path = fine.straightened(path, ~allowed, spacing)
+        used[path] = True
+        paths.append(path)
+    return edges_along(component, paths)
+
+
+def _chains(edges: np.ndarray, boundary: np.ndarray) -> list[np.ndarray]:
+    """Vertices (k,) of the paths that edges (e,2) make between vertices where they branch, end, or meet a boundary
+    (n,) bool; a loop with less than two such is two paths."""
+    n = len(boundary)
+    node = (np.bincount(edges.ravel(), minlength=n) != 2) | boundary
+    chains, waiting = list[np.ndarray](), [edges]
+    while waiting:
+        part = waiting.pop()
+        # Each edge has a place of its own for its ends at nodes.
+        place = np.where(node[part], n + np.arange(part.size).reshape(part.shape), part)
+        label = graph_components(place[:, 0], place[:, 1], n + part.size)[1][place[:, 0]]
+        for k in np.unique(label):
+            chain = part[label == k]
+            ends = np.unique(chain[node[chain]])
+            begin = int(ends[0] if len(ends) else chain.min())
+            graph = csr_matrix((np.ones(len(chain)), tuple(chain.T)), shape=(n, n))
+            order, before = breadth_first_order(graph, begin, directed=False)
+            if len(ends) == 2:
+                chains.append(path_to(before, int(ends[1]))[::-1])
+            else:
+                node[[begin, order[-1]]] = True
+                waiting.append(chain)
+    return chains
 
 
 def _led(
