@@ -97,6 +97,7 @@ def faces():
             yield package.__name__, name, getattr(package, name)
 
 
+SPARSE = re.compile(r"(.*\.)?(coo|csr|csc)_(matrix|array)")
 FUNCTIONS = [pytest.param(f, id=f"{p.removeprefix('omt_uv.')}.{n}") for p, n, f in faces() if inspect.isfunction(f)]
 
 
@@ -172,6 +173,18 @@ def test_no_loop_of_python_visits_vertices_edges_or_faces():
 
 
 # ---- benchmarks, scripts and what tests share ---------------------------------------------------------------
+
+
+def test_sparse_matrices_of_entries_name_their_shape():
+    """Without one it ends with the last row that has an entry, which is the last one of most meshes, and not of all."""
+    short = [
+        place(path, n)
+        for path, n in nodes(MODULES, ast.Call)
+        if SPARSE.fullmatch(ast.unparse(n.func)) and n.args and isinstance(n.args[0], ast.Tuple)
+        and any(isinstance(part, ast.Tuple) for part in n.args[0].elts)
+        and len(n.args) < 2 and all(keyword.arg != "shape" for keyword in n.keywords)
+    ]  # fmt: skip
+    assert not short, short
 
 
 def test_what_goes_together_ends_together():

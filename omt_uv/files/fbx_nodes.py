@@ -45,7 +45,7 @@ def count(data: bytes) -> FbxCounts:
                 kinds[kind] += 1
             elif path[:2] == ("Objects", "Geometry Mesh"):
                 totals["/".join(path[2:])] += length
-    except (struct.error, IndexError, RecursionError) as error:
+    except (struct.error, IndexError) as error:
         raise FileError("the file ends too early") from error
     if not ended:
         raise FileError("the file ends too early")

@@ -14,7 +14,6 @@ import numpy as np
 from ..blender.mesh import read_uv
 from . import fbx_nodes
 from .in_place import glb_data, gltf, obj_text, ply
-from .in_place.imported import InPlaceError
 from .verified import FileError
 
 
@@ -31,7 +30,7 @@ def check(path: Path, suffix: str, meshes: Sequence[bpy.types.Object]) -> None:
     """Raise FileError unless a file holds at least the meshes of these objects, whole."""
     try:
         found = _COUNTERS[suffix](path)
-    except (InPlaceError, FileError, struct.error, KeyError, ValueError) as error:
+    except (struct.error, KeyError, ValueError) as error:
         raise FileError(f"What was written cannot be read again: {error}. Is the disk full?") from error
     wished = _counts(meshes, suffix)
     for name in ("vertices", "faces", "uv_corners"):

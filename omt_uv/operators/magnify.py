@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 
 from ..session import run
 from ..session.region_list import NAME as REGION_LIST
-from ..session.region_list import RegionListError, pairs_of, rows_of
+from ..session.region_list import pairs_of, rows_of
 from ..settings import (
     AUTO_SOURCE,
     BOUNDARIES,
@@ -215,7 +215,7 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
         texts = [text for text in self.further.split(",") if text.strip()]
         try:
             return region_factors(texts) if texts else pairs_of(context.view_layer.objects.active)
-        except (ValueError, RegionListError) as error:
+        except ValueError as error:
             raise GroupError(f"Further Regions: {str(error).rstrip('.')}.") from error
 
     def _further(self, pairs, regions, factors: list[tuple[str, float]]) -> list:

@@ -1,10 +1,13 @@
 """Many objects unwrapped at once."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 from work import counted_work
 
+from omt_uv.pipelines import unwrap as unwrap_pipeline
 from omt_uv.pipelines.layout import Refusal, UnwrapJob
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import Settings
@@ -108,3 +111,13 @@ def test_parts_between_existing_seams_are_not_joined():
     V, F = meshes.cube()
     found = drain(lay_out([UnwrapJob(split(V, F))], Settings(seams="existing")))
     assert len(found.maps[0].charts) == len(F)
+
+
+@pytest.mark.parametrize("alone", [0, 2])
+def test_a_chart_of_which_a_triangle_hangs_by_a_vertex_is_packed_with_what_fills_it(alone):
+    """Whichever triangle that is, the last one, too, whose sides have none beside them."""
+    triangles = np.insert([[0, 1, 2], [2, 1, 3]], alone, [3, 4, 5], axis=0)
+    chart = SimpleNamespace(patches=[1], triangles=triangles, disk="filled")
+    assert unwrap_pipeline._connected_triangles(chart) == "filled"
+    chart.triangles = triangles[np.arange(3) != alone]
+    assert unwrap_pipeline._connected_triangles(chart) is chart.triangles

@@ -1,9 +1,9 @@
 """What every function of the solver finds, private ones, too, on meshes of more kinds and sizes than `solver_runs` has.
 
 As `test_what_holds_of_every_function`, whose table has public functions on small meshes alone: `found_wider.tsv` has
-three figures of what each function finds in its first calls of every run of `wider_runs`, and of private ones in those
-of `solver_runs`. So a bound or a weight within a function, and a branch that is taken from a size on, is seen by what
-it changes. OMT_UV_ACCEPT=1 writes the table anew, without what the last digits of the input decide;
+three figures of what each function finds in its first calls of every run of `wider_runs` and `seldom_runs`, and of
+private ones in those of `solver_runs`. So a bound or a weight within a function, and a branch that is taken from a size
+on, is seen by what it changes. OMT_UV_ACCEPT=1 writes the table anew, without what the last digits of the input decide;
 OMT_UV_ACCEPT=fewer leaves out what does not hold here, to be called once with every OPENBLAS_CORETYPE.
 """
 
@@ -19,6 +19,7 @@ from pathlib import Path
 import meshes
 import numpy as np
 import recorded_calls
+import seldom_runs
 import solver_runs
 import wider_runs
 
@@ -32,6 +33,8 @@ MOST = 6
 LEFT_OUT = ("compared", "new_meshes")
 # What stands behind names of private functions in runs of `solver_runs`.
 SMALL = " on small meshes"
+# What stands behind names in runs of `seldom_runs`.
+SELDOM = " seldom"
 # Least share of the functions of the solver that are to be seen.
 MOST_OF_ALL = 0.85
 
@@ -47,10 +50,14 @@ def told():
     _forget()
     record = recorded_calls.Told(MOST)
     everything = [*recorded_calls.modules(), solver]
-    with recorded_calls.watching(record, everything, private=True), warnings.catch_warnings():
+    watched = recorded_calls.watching(record, everything, private=True, callers=(seldom_runs,))
+    with watched, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name, run in wider_runs.RUNS.items():
             record.next_run(wider_runs.MARKS.get(name, ""))
+            run()
+        for name, run in seldom_runs.RUNS.items():
+            record.next_run(SELDOM + " of symmetric meshes" * (name in seldom_runs.SYMMETRIC))
             run()
         for name, run in solver_runs.RUNS.items():
             if name not in LEFT_OUT:
@@ -83,6 +90,7 @@ def shaken(seed, monkeypatch):
     with monkeypatch.context() as patch:
         for module, names in (
             (wider_runs, ("bent", "curved", "wavy_quads", "wavy_mixed", "with_limbs", "broken_mesh")),
+            (seldom_runs, ("bent",)),
             (solver_runs, ("patch", "body")),
         ):
             for name in names:

@@ -347,9 +347,9 @@ def recorded(most: int = 1) -> Iterator[Record]:
 
 
 @contextmanager
-def watching(record: Record, everything: list, private: bool = False) -> Iterator[None]:
+def watching(record: Record, everything: list, private: bool = False, callers: tuple = ()) -> Iterator[None]:
     """A context in which a record hears of all calls of public functions and methods of modules, or of private ones,
-    too."""
+    too, by each other and by other modules, `callers`."""
     before, watched = [], {}
     forget(everything)
     for module in everything:
@@ -359,7 +359,7 @@ def watching(record: Record, everything: list, private: bool = False) -> Iterato
             else:
                 before.append((owner, attribute, function))
                 setattr(owner, attribute, _watched(record, name, function, True))
-    for module in everything:
+    for module in [*everything, *callers]:
         for attribute, value in list(vars(module).items()):
             if _is_one_of(value, watched):
                 before.append((module, attribute, value))

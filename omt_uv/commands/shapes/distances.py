@@ -176,7 +176,7 @@ def run_block(options: argparse.Namespace) -> None:
     try:
         asked = json.loads(options.input.read_text())
         index, block, curvature = Path(asked["index"]), asked["block"], float(asked["curvature"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise CommandError(f"{options.input}: is no block of distances ({error})") from error
     data = io.BytesIO()
     np.save(data, block_distances(read_index(index), tuple(block), curvature))

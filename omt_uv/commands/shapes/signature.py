@@ -44,10 +44,10 @@ def read_signature(path: Path):
     """A signature that was written. Raises CommandError."""
     import numpy as np
 
-    from ...pipelines.shapes.signature_index import unpacked
+    from ...pipelines.shapes.signature_index import UNREADABLE, unpacked
 
     try:
         with np.load(path, allow_pickle=False) as data:
             return unpacked(data["packed"], float(data["floor"]))
-    except (OSError, KeyError, ValueError) as error:
+    except UNREADABLE as error:
         raise CommandError(f"{path}: is no signature ({error})") from error

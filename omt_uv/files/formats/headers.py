@@ -97,7 +97,7 @@ def _gltf(path: Path) -> None:
     try:
         buffers = json.loads(path.read_bytes())["buffers"]
         named = [(unquote(of["uri"]), int(of["byteLength"])) for of in buffers if not of["uri"].startswith("data:")]
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError):
         return
     for name, size in named:
         there = path.parent / name

@@ -52,7 +52,7 @@ def read(data: bytes) -> Glb:
         raise InPlaceError("the file does not begin with JSON")
     try:
         doc = json.loads(chunks[0][1].decode())
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InPlaceError("the JSON of the file cannot be read") from error
     binary = b""
     if len(chunks) > 1 and chunks[1][0] == BINARY_CHUNK:

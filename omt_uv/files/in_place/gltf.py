@@ -7,7 +7,6 @@ Where OUT stands elsewhere and they do not, their bytes go into the text as well
 from __future__ import annotations
 
 import base64
-import binascii
 import json
 import re
 from collections.abc import Sequence
@@ -45,7 +44,7 @@ def read(data: bytes, folder: Path) -> Gltf:
     try:
         text = data.decode("utf-8-sig")
         doc = json.loads(text)
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InPlaceError("the file is no JSON") from error
     if not isinstance(doc, dict) or not isinstance(doc.get("buffers", []), list):
         raise InPlaceError("the JSON of the file is not that of glTF")
@@ -73,7 +72,7 @@ def _bytes_of(index: int, of: dict, folder: Path) -> bytes:
             raise InPlaceError(f"buffer {index} is of a kind that this program does not read")
         try:
             raw = base64.b64decode(body)
-        except (binascii.Error, ValueError) as error:
+        except ValueError as error:
             raise InPlaceError(f"buffer {index} is no base64") from error
     elif not uri or ELSEWHERE.match(uri):
         raise InPlaceError(f"buffer {index} is not in the folder of the file")

@@ -255,7 +255,7 @@ def lists(data: bytes, header: Header, element: Element, rows: Rows, name: str) 
     words = [data[a:b].split(None, n)[:n] for a, b, n in zip(rows.place[name], rows.start[1:], count, strict=True)]
     try:
         return np.array([float(w) for row in words for w in row]).astype("f8" if p.type[0] == "f" else "i8")
-    except (ValueError, OverflowError) as error:
+    except ValueError as error:
         raise InPlaceError(f"a value {name!r} of the file is no number") from error
 
 

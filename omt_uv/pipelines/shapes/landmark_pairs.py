@@ -68,7 +68,7 @@ def read_pairs(path: Path) -> Pairs:
     """
     try:
         rows = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise PairsError(f"{path}: {error}") from error
     sides: tuple[list[LandmarkPoint], list[LandmarkPoint]] = ([], [])
     try:

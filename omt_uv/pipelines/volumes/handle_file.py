@@ -48,7 +48,7 @@ def read_handle_file(path: Path) -> HandleFile:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise HandleFileError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise HandleFileError(f"{path}: is no JSON ({error})") from error
     handles = data.get("handles") if isinstance(data, dict) else data
     if not isinstance(handles, list) or not handles or not all(isinstance(h, dict) for h in handles):
@@ -96,7 +96,10 @@ def _vertices(entry: dict, body: FlowBody, members, where: str) -> np.ndarray | 
     if "group" in entry:
         return members(str(entry["group"]))
     try:
-        rows = np.unique(np.asarray(entry.get("vertices", []), np.int64).ravel())
+        given = np.asarray(entry.get("vertices", []))
+        if given.size and given.dtype.kind != "i":
+            raise TypeError("what is none cannot be cut to a whole number")
+        rows = np.unique(given.astype(np.int64).ravel())
     except (TypeError, ValueError) as error:
         raise HandleFileError(f"{where}: vertices are no list of numbers") from error
     if len(rows) and (rows[0] < 0 or rows[-1] >= len(body.positions)):
@@ -108,7 +111,7 @@ def _points(entry: dict, key: str, where: str) -> np.ndarray:
     """Points (k,3) of an entry."""
     try:
         points = np.asarray(entry.get(key), float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise HandleFileError(f"{where}: {key!r} is no list of points") from error
     if points.shape == (3,):
         points = points[None]

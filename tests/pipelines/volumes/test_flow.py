@@ -130,6 +130,8 @@ def test_handle_files_say_what_goes_where(tmp_path):
         ('[{"group": "none"}]', "has no vertices"),
         ('[{"vertices": [99]}]', "vertices 0 to 41"),
         ('[{"vertices": ["a"]}]', "no list of numbers"),
+        ('[{"vertices": [1.5]}]', "no list of numbers"),
+        ('[{"vertices": [1e30]}]', "no list of numbers"),
         ('[{"vertices": [0], "move": [0, 1]}]', "no list of points"),
         ('[{"from": "x", "to": [0, 0, 0]}]', "no list of points"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from sphere_shapes import blob, creature, lopsided, random_rotation, random_sphere
 
 from omt_uv.solver.maps.energy import area_forms_of, derivatives_of, elements
@@ -10,6 +11,7 @@ from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_qu
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from omt_uv.solver.refinement.hessian_blocks import Assembly, assembly_of
+from omt_uv.solver.sphere import newton
 from omt_uv.solver.sphere.newton import SphereProblem, derivatives, newton_direction, project_faces, retract, tangents
 
 
@@ -113,3 +115,18 @@ def test_one_folded_face_is_enough_for_no_energy():
         folded = signed_volumes(p, F) <= 0
         assert np.isinf(problem.energy(p)) == folded.any()
     assert folded.any() and not folded.all()
+
+
+@pytest.mark.parametrize("counts", [True, False])
+def test_a_half_of_a_quad_that_does_not_count_holds_no_step_up(counts, monkeypatch):
+    """What would fold at a thousandth of the step shortens it where it has a part in the energy, and only there."""
+    V, F = creature(3, 0, 1, 0)
+    V = V - V.mean(axis=0)
+    faces = polygon_elements(V, F, face_areas(V, F), np.tile(np.arange(len(F) // 2), 2))
+    none = faces.part == 0
+    assert none.any() and not none.all()
+    problem = SphereProblem(faces, faces.area * faces.ratio, faces.ratio, assembly_of(faces, len(V)), 3.0)
+    monkeypatch.setattr(newton, "fold_shares", lambda *_: np.where(none != counts, 1e-3, np.inf))
+    p = normalized(V)
+    found = problem.step(p, problem.energy(p), 1.0)
+    assert found.share > 0 and (found.share <= 1e-3) == counts
