@@ -407,18 +407,21 @@ def test_what_is_settled_stays_cut_when_its_chart_is_cut_anew():
     assert kept(settled) == kept(settled, 0) == sorted([*between, *inner[0], *inner[1]])
 
 
-@pytest.mark.parametrize("of_pieces", [False, True])
-def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, monkeypatch):
+@pytest.mark.parametrize(
+    "of_pieces, thinned, settled", [(False, [], False), (True, [], True), (False, [0], True), (False, [1], False)]
+)
+def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, thinned, settled, monkeypatch):
     n, seen = 24, []
     _, search, seam = halves(n, 1.3)
     slits = [edges_along(row * (n + 1) + np.arange(n // 2 + 6)) for row in (4, n - 4)]
     before = made_round(search, np.concatenate([seam, *slits]), [2.0, 1.0], [])
     assert before.searched == [0]
+    search.thinned.extend(before.charts[k].faces for k in thinned)
     monkeypatch.setattr(shear_bound, "_first_round", lambda *_: worked(before))
     monkeypatch.setattr(shear_bound, "_apart", lambda _, last, *__: worked(seen.append(last.settled)))
     monkeypatch.setattr(shear_bound, "_made_shorter", lambda _, best, *__: worked(best))
     drain(shear_bound.bound_shear(search, SimpleNamespace(warnings=()), [], None, of_pieces=of_pieces))
-    assert sorted(seen[0]) == (sorted(within(before.charts[0])) if of_pieces else [])
+    assert sorted(seen[0]) == (sorted(within(before.charts[0])) if settled else [])
 
 
 @pytest.mark.parametrize("shears, worth", [((1.1, 1.3), True), ((1.1, 1.32), False), ((1.1, 1.36), True), ((), True)])
