@@ -132,10 +132,11 @@ def folded(patch):
         yield gate.Gate(9, folds, 0.0).warnings(None if before is None else gate.Gate(9, before, 0.0)), told
 
 
-@says("pipelines/gate.py", "{} % of the UV area is under several faces")
+@says("pipelines/gate.py", "{} of the UV area is under several faces")
 def overlapping(patch):
     text = "{} % of the UV area is under several faces"
     for share, before, told in (
+        (0.9973, None, [text.format(100)]),
         (1e-4, None, []), (1.01e-4, None, [text.format("0.01")]), (0.256, None, [text.format(26)]),
         (0.25, 0.2498, [text.format(25)]), (0.25, 0.24995, [text.format(25) + ", as before"]),
     ):  # fmt: skip

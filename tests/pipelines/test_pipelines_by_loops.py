@@ -595,11 +595,6 @@ def test_the_largest_part_has_the_most_area_and_the_rest_is_named():
     assert renamed.target[0].position == (0, 0, 1)
 
 
-@pytest.mark.parametrize(("share", "text"), [(0.0123, "1.2 %"), (0.0999, "10 %"), (0.456, "46 %"), (0.0004, "0.04 %")])
-def test_shares_are_told_with_two_digits(share, text):
-    assert partition._percent(share) == text
-
-
 def test_cells_are_told_with_their_numbers_and_a_verb():
     assert partition._cells(np.array([3])) == "1 cell (3) is"
     assert (
