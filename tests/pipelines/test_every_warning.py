@@ -340,6 +340,16 @@ def too_small(patch):
         assert remesh._features(remesh.RemeshJob(surface, lines[:0], lines[:0], None), F, None, 20)[1] == ()
 
 
+@says("pipelines/remesh.py", "{} through others, as none does")
+def passing_through(patch):
+    V = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [2, 1, -1], [1, 1, 1]], float)
+    one, apart = np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1, 2]])
+    words = "2 faces of the new mesh pass through others, as none does in the old one: "
+    told = [words + "parts are thinner than the new triangles. Ask for more"]
+    for new, old, texts in ((one, apart, told), (one, one, []), (apart, apart, []), (apart, one, [])):
+        yield remesh._crossings(V, new, V, old), texts
+
+
 def test_faces_that_reach_across_a_seam_are_counted():
     """Of every level, with its name where there are several."""
     V, F = meshes.bumpy(6, 6)

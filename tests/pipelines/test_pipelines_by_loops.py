@@ -508,6 +508,11 @@ def test_errors_of_a_closed_part_name_elements_of_the_surface(kind, elements, wa
     found = _located(MeshError("No", "Do", kind, np.array(elements, int)), ball())
     assert found.elements.tolist() == want and found.kind == (kind or "face")
     assert (found.cause, found.remedy) == ("No", "Do")
+    # What fills the holes is not the surface's.
+    beyond = _located(MeshError("No", "Do", kind, np.array([*elements, 99], int)), ball())
+    assert beyond.elements.tolist() == want or not kind
+    sides = _located(MeshError("No", "Do", "edge", np.array([[3, 1], [1, 99]])), ball())
+    assert sides.elements.tolist() == [[13, 11]]
 
 
 # ---- attributes ---------------------------------------------------------------------------------------------
