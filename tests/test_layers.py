@@ -74,7 +74,7 @@ ARROWS: dict[str, str] = {
     "xatlas_charts": "errors solver solver.mesh",
     "pipelines": "errors settings solver solver.mesh solver.canonical solver.analysis solver.maps solver.packing "
     "solver.subdivision solver.transfer solver.refinement "
-    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
+    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing solver.contact "
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
     "solver.registration.charts "

@@ -13,6 +13,7 @@ import numpy as np
 from ..blender.versions import known_options, settle_context
 from .in_place import glb_data, gltf
 from .meshes import AXES
+from .obj_materials import name_materials
 from .obj_precision import restore_precision
 
 Objects = Sequence[bpy.types.Object]
@@ -48,22 +49,26 @@ def _select_only(objects: Objects) -> None:
 
 
 def _write_obj(path: Path, objects: Objects, everything: bool) -> list[str]:
-    """Write an OBJ file; returns warnings."""
+    """Write an OBJ file; returns no warnings."""
     objects = exported_meshes(objects, everything)
     _select_only(objects)
+    materials = any(obj.data.materials for obj in objects)
     # The exporter sorts faces by material, and only where it writes materials.
     ordered = all(_materials_ascend(obj.data) for obj in objects)
-    bpy.ops.wm.obj_export(
-        filepath=str(path),
-        export_selected_objects=True,
-        export_materials=ordered and any(obj.data.materials for obj in objects),
-        export_normals=any(obj.data.has_custom_normals for obj in objects),
-        export_colors=any(obj.data.color_attributes for obj in objects),
-        apply_modifiers=False,
-        **AXES,
-    )
+    for with_materials in [materials] if ordered or not materials else [True, False]:
+        bpy.ops.wm.obj_export(
+            filepath=str(path),
+            export_selected_objects=True,
+            export_materials=with_materials,
+            export_normals=any(obj.data.has_custom_normals for obj in objects),
+            export_colors=any(obj.data.color_attributes for obj in objects),
+            apply_modifiers=False,
+            **AXES,
+        )
     restore_precision(path, objects)
-    return [] if ordered else ["Materials were left out of the OBJ file, which would have changed the order of faces"]
+    if materials and not ordered:
+        name_materials(path, objects)
+    return []
 
 
 def _materials_ascend(mesh: bpy.types.Mesh) -> bool:

@@ -1,10 +1,17 @@
-"""Give the .mtl of an OBJ file that was exported its name, which never is that of another file."""
+"""Materials of an OBJ file that was exported: of faces in their own order, and a .mtl whose name is nobody else's."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from .verified import check_length
+
+if TYPE_CHECKING:
+    import bpy
 
 
 def place_materials(made: Path, target: Path, companions: dict[Path, Path]) -> list[str]:
@@ -28,3 +35,26 @@ def place_materials(made: Path, target: Path, companions: dict[Path, Path]) -> l
     made.write_bytes(text)
     companions[materials] = place
     return told
+
+
+def name_materials(path: Path, objects: Sequence[bpy.types.Object]) -> None:
+    """Add the lines mtllib and usemtl to an OBJ file that was written of these objects without them, beside its .mtl.
+
+    The exporter itself sorts faces by material before it writes any.
+    """
+    lines = path.read_text().split("\n")
+    by_name = {obj.name.replace(" ", "_"): obj for obj in objects}
+    begins = [i for i, line in enumerate(lines) if line.startswith("o ")]
+    for begin, end in zip(begins, [*begins[1:], len(lines)], strict=True):
+        obj = by_name.get(lines[begin][2:])
+        if obj is None:
+            continue
+        faces = [i for i in range(begin, end) if lines[i].startswith("f ")]
+        index = np.zeros(len(obj.data.polygons), np.int32)
+        obj.data.polygons.foreach_get("material_index", index)
+        names = [slot.material.name.replace(" ", "_") if slot.material else "" for slot in obj.material_slots]
+        for k in np.flatnonzero(np.diff(index, prepend=-1)).tolist():
+            name = names[index[k]] if index[k] < len(names) else ""
+            lines[faces[k]] = f"usemtl {name}\n{lines[faces[k]]}"
+    lines[begins[0]] = f"mtllib {path.with_suffix('.mtl').name}\n{lines[begins[0]]}"
+    path.write_text("\n".join(lines))

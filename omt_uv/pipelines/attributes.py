@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..solver.analysis.feature_edges import edge_union, region_borders, value_jumps
+from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
 
@@ -116,11 +117,21 @@ def followed(attributes: Attributes, lines: np.ndarray) -> Attributes:
 
 def uv_seams(attributes: Attributes, surface: Surface) -> np.ndarray:
     """Edges (k,2) where islands of any UV map end."""
+    return edge_union(*(_ends_of_islands(layer.values, surface) for layer in attributes.layers if is_uv(layer)))
+
+
+def _ends_of_islands(uv: np.ndarray, surface: Surface) -> np.ndarray:
+    """Edges (k,2) where islands of one map (corners,2) end.
+
+    Between faces without area in the map there is no island, and nothing that a new mesh could follow: exporters write
+    such maps, where a mesh has none.
+    """
     triangles = surface.corner_vertex[surface.triangles]
-    maps = [layer.values for layer in attributes.layers if is_uv(layer)]
-    return edge_union(
-        *(value_jumps(triangles, surface.triangles, uv, SAME_UV * np.ptp(uv, axis=0).max(initial=0)) for uv in maps)
-    )
+    same = SAME_UV * np.ptp(uv, axis=0).max(initial=0)
+    jumps = value_jumps(triangles, surface.triangles, uv, same)
+    flat = np.flatnonzero(np.abs(signed_areas(uv, surface.triangles)) <= same * same)
+    between = region_borders(triangles[flat], flat)
+    return jumps[~np.isin(pair_keys(*jumps.T), pair_keys(*between.T))]
 
 
 def material_borders(attributes: Attributes, surface: Surface) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..solver.errors import EmptyMeshError, plural
+from ..solver.errors import EmptyMeshError, plural, two_digits
 from ..solver.maps.distortion import NEGLIGIBLE_AREA
 from ..solver.maps.embedding import check_layout
 from ..solver.mesh.geometry import face_areas
@@ -37,9 +37,8 @@ class Gate:
             told.append(f"{count} folded in the UVs{', as before' if same else ''}")
         if self.overlap > OVERLAP:
             same = before is not None and self.overlap <= before.overlap + OVERLAP
-            told.append(
-                f"{100 * self.overlap:.2g} % of the UV area is under several faces{', as before' if same else ''}"
-            )
+            share = two_digits(self.overlap)
+            told.append(f"{share} of the UV area is under several faces{', as before' if same else ''}")
         return tuple(told)
 
 

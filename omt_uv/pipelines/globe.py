@@ -18,7 +18,7 @@ from ..solver.mesh.gluing import groups
 from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.spherical_geometry import spherical_areas
 from ..solver.mesh.surface import Surface, chosen_triangles
-from ..solver.mesh.topology import boundary_loops, graph_components, with_fans
+from ..solver.mesh.topology import boundary_loops, graph_components, halfedges, split_fans, with_fans
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.sphere.figures import sphere_figures
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
@@ -68,7 +68,11 @@ class ClosedComponent:
     fans: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
 
     def filled(self) -> ClosedComponent:
-        """The component with fans in its holes, for the map alone."""
+        """The component with fans in its holes, for the map alone; as it is where holes have no outline, since faces do
+        not agree about their sides, or more than two meet in an edge: the map says so."""
+        tail, head = halfedges(self.triangles)
+        if len(np.unique(tail * len(self.vertices) + head)) < len(tail) or (tail == head).any():
+            return self
         vertices, triangles = with_fans(self.vertices, self.triangles, boundary_loops(self.triangles))
         return replace(self, centres=vertices[len(self.vertices) :], fans=triangles[len(self.triangles) :])
 
@@ -181,8 +185,9 @@ def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list
     """
     chosen, triangles, owner = chosen_triangles(surface, faces)
     members = np.flatnonzero(chosen[surface.triangle_face])
-    vertex = surface.corner_vertex[triangles]
-    n = len(surface.positions)
+    # Where fans of faces touch in a vertex alone, each has one of its own.
+    vertex, given = split_fans(surface.corner_vertex[triangles], len(surface.positions))
+    n = len(given)
     rows, columns = vertex[:, [0, 1]].ravel(), vertex[:, [1, 2]].ravel()
     label = graph_components(rows, columns, n)[1]
     components = []
@@ -191,11 +196,11 @@ def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list
         local = local.reshape(-1, 3).astype(np.int64)
         components.append(
             ClosedComponent(
-                vertices=surface.positions[ids],
+                vertices=surface.positions[given[ids]],
                 triangles=local,
                 corners=triangles[mine],
                 faces=owner[mine],
-                vertex_ids=ids,
+                vertex_ids=given[ids],
                 members=members[mine],
             )
         )
@@ -297,9 +302,10 @@ def _pole_warnings(missed: int, folded: int) -> list[str]:
 
 
 def _located(error: MeshError, component: ClosedComponent) -> MeshError:
-    """The error with indices of the surface in the place of the component's."""
+    """The error with indices of the surface in the place of the component's; what fills its holes has none there."""
     ids = component.faces if error.kind == "face" else component.vertex_ids
-    elements = ids[error.elements] if len(error.elements) else error.elements
+    there = error.elements < len(ids)
+    elements = ids[error.elements[there.all(axis=1) if there.ndim > 1 else there]]
     if error.kind == "face":
         elements = np.unique(elements)
     if not error.kind:

@@ -20,6 +20,7 @@ from ..solver.analysis.density import (
 from ..solver.analysis.feature_edges import edge_union, resolved_features
 from ..solver.analysis.occlusion import hidden_sides, looks_out
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
+from ..solver.contact.self_intersections import intersecting_pairs
 from ..solver.errors import CountError, DensityError, MeshError, plural, reaching
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import Gluing, orientations
@@ -109,10 +110,24 @@ def remesh_series(job: RemeshJob, settings: RemeshSettings) -> Steps[Series]:
         with _located(surface, name):
             level = yield from part_of(steps, k / len(counts), 1 / len(counts))
         levels.append(level)
-        warnings += [name + text for text in (*joined, *level.found.warnings)]
+        crossing = _crossings(level.positions, level.triangles, surface.positions, triangles)
+        warnings += [name + text for text in (*joined, *level.found.warnings, *crossing)]
         if level.correspondence.extended:
             warnings.append(f"{name}{reaching(level.correspondence.extended)}")
     return Series(levels, warnings)
+
+
+def _crossings(
+    positions: np.ndarray, triangles: np.ndarray, old_positions: np.ndarray, old_triangles: np.ndarray
+) -> tuple[str, ...]:
+    """A warning where faces of a new mesh (n,3), (m,3) pass through one another, and none of the old one does."""
+    pairs = intersecting_pairs(positions, triangles)
+    if not len(pairs) or len(intersecting_pairs(old_positions, old_triangles)):
+        return ()
+    who = plural(len(np.unique(pairs)), "1 face of the new mesh passes", "{} faces of the new mesh pass")
+    return (
+        f"{who} through others, as none does in the old one: parts are thinner than the new triangles. Ask for more",
+    )
 
 
 def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -> tuple[str, list[int]]:

@@ -197,8 +197,10 @@ def rows_of(found, max_shear: float = DEFAULT_MAX_SHEAR) -> Figures:
 
 def overlap_row(overlap: float) -> Figures:
     """The row about the share of the UV area that is under several faces."""
+    from ..solver.errors import two_digits
+
     beyond = frozenset({"Overlap"}) if overlap > OVERLAP_BOUND else frozenset()
-    return Figures((("Overlap", f"{100 * overlap:.2g} %"),), beyond)
+    return Figures((("Overlap", two_digits(overlap)),), beyond)
 
 
 def density_text(per_metre: float) -> str:

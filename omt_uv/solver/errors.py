@@ -288,6 +288,15 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= LEAST_TOLD else f"less than {100 * LEAST_TOLD:.0f} %"
 
 
+def two_digits(share: float) -> str:
+    """A share in two digits, or as a whole number of hundredths.
+
+    >>> two_digits(0.00256), two_digits(0.9973)
+    ('0.26 %', '100 %')
+    """
+    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
+
+
 def without_room(boundary: str, why: str) -> str:
     """What is said of a chart whose boundary is free, since the one asked for has no room for it.
 

@@ -176,18 +176,10 @@ def unlike_attributes(scene):
 
 
 @says("files/export.py", "STL files hold no UVs")
-@says("files/export.py", "Materials were left out")
 def left_out_of_a_format(scene):
-    import bpy
-
     module = scene.module("files.export")
     obj = scenes.add(*SQUARE)
-    for name in "ab":
-        obj.data.materials.append(bpy.data.materials.new(name))
-    for order, ordered in (((0, 1), True), ((1, 0), False)):
-        obj.data.polygons.foreach_set("material_index", order)
-        text = "Materials were left out of the OBJ file, which would have changed the order of faces"
-        yield module._write_obj(scene.folder / "a.obj", [obj], False), [] if ordered else [text]
+    yield module._write_obj(scene.folder / "a.obj", [obj], False), []
     stl = "STL files hold no UVs; write .blend, .obj, .ply, .glb, .gltf or .fbx to keep them"
     yield module._write_stl(scene.folder / "a.stl", [obj], False), [stl]
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import bpy
+
+import pytest
+import scenes
+
 from omt_uv.files.obj_materials import place_materials
 
 
@@ -41,3 +46,27 @@ def test_without_materials_nothing_is_named(tmp_path):
     before = made.read_bytes()
     assert place_materials(made, tmp_path / "out.obj", companions) == [] and not companions
     assert made.read_bytes() == before
+
+
+@pytest.mark.parametrize("index", [[0, 0, 1, 2], [2, 0, 1, 0], [1, 0, 2, 2], [0, 3, 0, 1]])
+def test_faces_keep_their_order_and_their_materials(package, tmp_path, index):
+    """The exporter sorts faces by material; the third slot is empty, and the fourth the first once more."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    one, other = scenes.bump(2, 2, name="One of two"), scenes.bump(1, 2, name="Other")
+    red, blue = (bpy.data.materials.new(name) for name in ("Red paint", "Blue"))
+    for material in (red, blue, None, red):
+        one.data.materials.append(material)
+    one.data.polygons.foreach_set("material_index", index)
+    for slot in (1, 3):
+        one.data.polygons[slot].use_smooth = False
+    other.data.materials.append(blue)
+    faces = [[vertex for polygon in obj.data.polygons for vertex in polygon.vertices] for obj in (one, other)]
+    assert package("files.export").export(tmp_path / "out.obj", ".obj", [one, other], False) == []
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.obj_import(filepath=str(tmp_path / "out.obj"), forward_axis="Y", up_axis="Z")
+    one, other = (bpy.data.objects[name] for name in ("One_of_two", "Other"))
+    assert faces == [[vertex for polygon in obj.data.polygons for vertex in polygon.vertices] for obj in (one, other)]
+    # Blender's importer makes a material of none.
+    names = ["Red_paint", "Blue", "Material", "Red_paint"]
+    there = [one.material_slots[polygon.material_index].material.name for polygon in one.data.polygons]
+    assert there == [names[k] for k in index] and [slot.name for slot in other.material_slots] == ["Blue"]

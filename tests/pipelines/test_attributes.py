@@ -66,6 +66,18 @@ def test_uv_seams_are_where_any_map_jumps():
     assert as_set(uv_seams(carried(F, layers=[whole, cut, colour]), surface)) == middle(F, V)
 
 
+def test_faces_without_area_in_a_map_have_no_seams_between_them():
+    V, F = meshes.grid(2, 3)
+    surface, uv = triangle_surface(V, F), V[F.ravel(), :2].copy()
+    right = np.repeat(V[F, 0].mean(axis=1) > 0.5, 3)
+    # As some exporters write where there are no UVs: the same few places at the corners of every face.
+    uv[right] = np.tile([[2.0, 1.0], [3.0, 1.0], [2.0, 1.0]], (right.sum() // 3, 1))
+    found = uv_seams(carried(F, layers=[Layer("UV", "CORNER", "FLOAT2", uv)]), surface)
+    assert as_set(found) == middle(F, V)
+    everywhere = Layer("UV", "CORNER", "FLOAT2", np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]], (len(F), 1)))
+    assert len(uv_seams(carried(F, layers=[everywhere]), surface)) == 0
+
+
 def test_borders_of_materials():
     V, F = meshes.grid(2, 3)
     attributes = carried(F)

@@ -10,7 +10,7 @@ import pytest
 from omt_uv import settings
 from omt_uv.pipelines.volumes import choices
 from omt_uv.solver.api import functions, steps
-from omt_uv.solver.errors import percent
+from omt_uv.solver.errors import percent, two_digits
 from omt_uv.solver.flows.options import FlowOptions
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.refinement.refine import RefinementOptions
@@ -60,3 +60,11 @@ def test_magnifications_and_flows_are_alike_in_functions_and_settings():
 )
 def test_shares_that_are_hardly_seen_are_not_nothing(share, words):
     assert percent(share) == words
+
+
+@pytest.mark.parametrize(
+    "share, words",
+    [(0.0, "0 %"), (0.0004, "0.04 %"), (0.0123, "1.2 %"), (0.0999, "10 %"), (0.456, "46 %"), (0.997, "100 %")],
+)
+def test_shares_are_told_with_two_digits_or_whole(share, words):
+    assert two_digits(share) == words

@@ -132,10 +132,11 @@ def folded(patch):
         yield gate.Gate(9, folds, 0.0).warnings(None if before is None else gate.Gate(9, before, 0.0)), told
 
 
-@says("pipelines/gate.py", "{} % of the UV area is under several faces")
+@says("pipelines/gate.py", "{} of the UV area is under several faces")
 def overlapping(patch):
     text = "{} % of the UV area is under several faces"
     for share, before, told in (
+        (0.9973, None, [text.format(100)]),
         (1e-4, None, []), (1.01e-4, None, [text.format("0.01")]), (0.256, None, [text.format(26)]),
         (0.25, 0.2498, [text.format(25)]), (0.25, 0.24995, [text.format(25) + ", as before"]),
     ):  # fmt: skip
@@ -337,6 +338,16 @@ def too_small(patch):
         assert len(kept) == 3 - count
         yield texts, told
         assert remesh._features(remesh.RemeshJob(surface, lines[:0], lines[:0], None), F, None, 20)[1] == ()
+
+
+@says("pipelines/remesh.py", "{} through others, as none does")
+def passing_through(patch):
+    V = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [2, 1, -1], [1, 1, 1]], float)
+    one, apart = np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1, 2]])
+    words = "2 faces of the new mesh pass through others, as none does in the old one: "
+    told = [words + "parts are thinner than the new triangles. Ask for more"]
+    for new, old, texts in ((one, apart, told), (one, one, []), (apart, apart, []), (apart, one, [])):
+        yield remesh._crossings(V, new, V, old), texts
 
 
 def test_faces_that_reach_across_a_seam_are_counted():

@@ -10,7 +10,7 @@ from readings import reading, together
 from omt_uv.pipelines.globe import GlobeJob, Markers, closed_components, globe_jobs, project
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.settings import GlobeSettings
-from omt_uv.solver.errors import MeshError
+from omt_uv.solver.errors import DuplicateFaceError, MeshError, OrientationError
 from omt_uv.solver.globe.rotation import MarkerError
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
@@ -44,6 +44,38 @@ def test_only_chosen_polygons_are_a_component():
     V, F = two()
     found = closed_components(triangle_surface(V, F), np.arange(len(F)) >= 80)
     assert len(found) == 1 and found[0].faces.min() == 80 and found[0].vertex_ids.min() == 42
+
+
+def test_fans_that_touch_in_a_vertex_alone_are_apart():
+    V, F = two()
+    joined = np.where(F == 42, 0, F)
+    found = closed_components(triangle_surface(V, joined))
+    assert sorted(len(c.faces) for c in found) == [80, 80] and all(0 in c.vertex_ids for c in found)
+    # Holes that touch become one, around both copies of their vertex.
+    W, G = meshes.icosphere(2)
+    around = np.flatnonzero((G == 0).any(axis=1))
+    apart = next(k for k in around[1:] if len(np.intersect1d(G[k], G[around[0]])) == 1)
+    left = np.delete(G, [around[0], apart], axis=0)
+    (job,) = globe_jobs([reading(W, left)], [None], [None])
+    (globe,) = drain(project([job], replace(LAMBERT, fill_holes=True))).globes[0]
+    assert len(globe.component.centres) == 1 and len(globe.component.vertices) == len(W) + 1
+    assert (globe.areas > 0).all() and len(globe.areas) == len(left)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error", "shape"),
+    [
+        (lambda F: np.concatenate([F[2:3, ::-1], F[3:]]), OrientationError, (2, 2)),
+        (lambda F: np.concatenate([F[1:], F[5:6, [1, 0, 2]]]), DuplicateFaceError, (2,)),
+    ],
+    ids=["turned", "double"],
+)
+def test_holes_without_an_outline_are_refused_by_their_cause(spoil, error, shape):
+    V, F = meshes.icosphere(1)
+    jobs = globe_jobs([reading(V, spoil(F))], [None], [None])
+    with pytest.raises(Refusal) as found:
+        drain(project(jobs, replace(LAMBERT, fill_holes=True)))
+    assert isinstance(found.value.error, error) and found.value.error.elements.shape == shape
 
 
 def test_different_surfaces_each_get_a_whole_texture_and_their_own_shares():

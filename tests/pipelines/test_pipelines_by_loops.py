@@ -508,6 +508,11 @@ def test_errors_of_a_closed_part_name_elements_of_the_surface(kind, elements, wa
     found = _located(MeshError("No", "Do", kind, np.array(elements, int)), ball())
     assert found.elements.tolist() == want and found.kind == (kind or "face")
     assert (found.cause, found.remedy) == ("No", "Do")
+    # What fills the holes is not the surface's.
+    beyond = _located(MeshError("No", "Do", kind, np.array([*elements, 99], int)), ball())
+    assert beyond.elements.tolist() == want or not kind
+    sides = _located(MeshError("No", "Do", "edge", np.array([[3, 1], [1, 99]])), ball())
+    assert sides.elements.tolist() == [[13, 11]]
 
 
 # ---- attributes ---------------------------------------------------------------------------------------------
@@ -593,11 +598,6 @@ def test_the_largest_part_has_the_most_area_and_the_rest_is_named():
     renamed = _renamed(mine, part, part)
     assert [p.vertex for p in renamed.source] == [2, 9] and [p.vertex for p in renamed.target] == [-1, -1]
     assert renamed.target[0].position == (0, 0, 1)
-
-
-@pytest.mark.parametrize(("share", "text"), [(0.0123, "1.2 %"), (0.0999, "10 %"), (0.456, "46 %"), (0.0004, "0.04 %")])
-def test_shares_are_told_with_two_digits(share, text):
-    assert partition._percent(share) == text
 
 
 def test_cells_are_told_with_their_numbers_and_a_verb():

@@ -147,7 +147,6 @@ def test_what_is_said_of_cells_is_about_what_is_written(write):
     calm = SimpleNamespace(unequal=0.001, residual=0.001)
     none = SimpleNamespace(empty=np.array([], int), torn=np.array([], int))
     assert partition._warnings(calm, none, np.array([], int), partition.PartitionSettings(write=write)) == ()
-    assert [partition._percent(x) for x in (0.0012, 0.099, 0.1, 0.5)] == ["0.12 %", "9.9 %", "10 %", "50 %"]
 
 
 def test_signatures_of_one_kind_and_size_make_an_index_that_older_ones_join(monkeypatch):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...settings import MOST_MATERIALS, PartitionSettings
-from ...solver.errors import CountError, first_of, plural
+from ...solver.errors import CountError, first_of, plural, two_digits
 from ...solver.mesh.geometry import face_areas, face_normals
 from ...solver.mesh.surface import Surface, chosen_triangles
 from ...solver.mesh.topology import pair_keys, pair_up
@@ -148,7 +148,7 @@ def _warnings(division: Division, whole: FaceCells, torn: np.ndarray, settings: 
     if division.unequal > division.residual + 1e-6:
         told.append(
             "Every separate part has whole cells, so that cells of different parts differ by up to "
-            + _percent(division.unequal)
+            + two_digits(division.unequal)
         )
     if settings.write == "mesh":
         if len(torn):
@@ -169,8 +169,3 @@ def _cells(numbers: np.ndarray) -> str:
     """Some cells in words, with a verb."""
     count = len(numbers)
     return f"{plural(count, '1 cell', '{} cells')} ({first_of(numbers)}) {'is' if count == 1 else 'are'}"
-
-
-def _percent(share: float) -> str:
-    """A share in two digits, or as a whole number."""
-    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"

@@ -88,13 +88,13 @@ def _check_edges(triangles: np.ndarray) -> None:
     ends = paired(edges)
     if (count > 2).any():
         raise NonManifoldEdgeError("More than two faces meet at an edge", kind="edge", elements=ends[count > 2])
+    forward = np.bincount(inverse.ravel(), tail < head, len(edges))
+    if (unlike := (count == 2) & (forward != 1)).any():
+        raise OrientationError("Neighbouring faces have opposite orientation", kind="edge", elements=ends[unlike])
     if (count < 2).any():
         raise OpenSurfaceError(
             "The surface is not closed: it has boundary edges", kind="edge", elements=ends[count < 2]
         )
-    forward = np.bincount(inverse.ravel(), tail < head, len(edges))
-    if (forward != 1).any():
-        raise OrientationError("Neighbouring faces have opposite orientation", kind="edge", elements=ends[forward != 1])
 
 
 def _check_components(triangles: np.ndarray, n: int) -> None:

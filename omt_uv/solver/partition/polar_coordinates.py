@@ -17,8 +17,12 @@ from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import expand, graph_components, halfedges, split_fans
 from .sites import Sites
 
-# A distance is new when it is shorter by more than this share.
+# A distance is new when it is shorter by more than this share,
 SHORTER = 1e-9
+# and after it has been new so often, by so many times more each time: across slivers, two corners may shorten each
+# other by less and less without an end.
+OFTEN = 16
+MORE = 4.0
 # Rounds at most, of one ring of triangles each.
 MOST_ROUNDS = 5000
 # Width of a band of distances that advance together, in mean sides of the triangles.
@@ -165,6 +169,7 @@ def _propagate(mesh: WindowMesh, window: Window, distance: np.ndarray, log: np.n
     row = window.entries // len(mesh.positions)
     width = BAND * side[row]
     new = np.isfinite(distance) & (distance <= limit)
+    gain = np.full(len(distance), SHORTER / MORE**OFTEN)
     # What waits to go on: all of `new`, and nothing else, as rounds are many and each is small.
     waiting = np.flatnonzero(new)
     for _ in range(MOST_ROUNDS):
@@ -176,7 +181,8 @@ def _propagate(mesh: WindowMesh, window: Window, distance: np.ndarray, log: np.n
         ahead = level <= least[site] + 1
         ready, waiting = waiting[ahead], waiting[~ahead]
         new[ready] = False
-        at = _spread_from(mesh, window, ready, (order, first, count), distance, log)
+        at = _spread_from(mesh, window, ready, (order, first, count), distance, log, gain)
+        gain[at] *= MORE
         at = np.unique(at[~new[at] & (distance[at] <= limit[at])])
         new[at] = True
         waiting = np.concatenate([waiting, at])
@@ -189,8 +195,9 @@ def _spread_from(
     corners: tuple[np.ndarray, np.ndarray, np.ndarray],
     distance: np.ndarray,
     log: np.ndarray,
+    gain: np.ndarray,
 ) -> np.ndarray:
-    """Entries (k,) that come nearer, seen from those that are ready (r,).
+    """Entries (k,) that come nearer by a share of more than their `gain` (e,), seen from those that are ready (r,).
 
     corners : those of each entry, ordered by entry (3 p,), where its own begin (e + 1,), and how many they are (e,)
     """
@@ -199,7 +206,7 @@ def _spread_from(
     halfedge = order[first[ready][row] + place]
     # Seen from its triangle, the corner that is ready is the first end for one of the others, and the second one.
     turn = np.repeat([1, 2], len(halfedge))
-    at, values, places = _unfolded(mesh, window, np.tile(halfedge, 2), turn, distance, log)
+    at, values, places = _unfolded(mesh, window, np.tile(halfedge, 2), turn, distance, log, gain)
     np.minimum.at(distance, at, values)
     least = values == distance[at]
     log[at[least]] = places[least]
@@ -207,7 +214,13 @@ def _spread_from(
 
 
 def _unfolded(
-    mesh: WindowMesh, window: Window, halfedge: np.ndarray, turn: np.ndarray, distance: np.ndarray, log: np.ndarray
+    mesh: WindowMesh,
+    window: Window,
+    halfedge: np.ndarray,
+    turn: np.ndarray,
+    distance: np.ndarray,
+    log: np.ndarray,
+    gain: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What corners of triangles get nearer by: entries (k,), their distances (k,) and places (k,2).
 
@@ -231,7 +244,7 @@ def _unfolded(
         straight = (crossing >= 0) & (crossing <= c) & (v > 0)
         along = np.minimum(da + to_a, db + to_b)
         found = np.where(straight, np.sqrt((x - u) ** 2 + (y + v) ** 2), along)
-        better = found < distance[at] * (1 - SHORTER)
+        better = found < distance[at] * (1 - np.maximum(gain[at], SHORTER))
         at, a, b, found, straight = at[better], a[better], b[better], found[better], straight[better]
         c, x, y, u, v, da, db = (k[better] for k in (c, x, y, u, v, da, db))
         # The corner as a combination of a and b, all seen from the source; the surface's directions combine alike.

@@ -127,6 +127,9 @@ def straightened(before: np.ndarray, triangles: np.ndarray, after: np.ndarray, h
     folded = ~(signed_volumes(after, triangles) > 0)
     if folded.any():
         spot = vertices_around(triangles, folded, len(after), LAID_OUT_RINGS) & ~held
+        if spot.all():
+            # Folds all over leave nothing around them to lay them out from.
+            return after
         fresh = laid_out(before, triangles, after, spot)
         for rings in RINGS:
             fresh = yield from _each_spot(before, triangles, fresh, held, rings)

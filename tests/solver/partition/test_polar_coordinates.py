@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 
+from omt_uv.solver.partition import polar_coordinates as polar
 from omt_uv.solver.partition.polar_coordinates import WindowMesh, polar_coordinates
 from omt_uv.solver.partition.sites import Sites, inner
 
@@ -68,3 +69,22 @@ def test_parts_that_only_lie_near_are_not_seen():
     V2 = np.concatenate([V, V + [0, 0, 0.01]])
     pairs = seen(V2, np.concatenate([F, F + len(V)]), Sites(np.array([0]), np.full((1, 3), 1 / 3)), 5.0)
     assert set(pairs.face.tolist()) == set(range(len(F)))
+
+
+def test_corners_of_slivers_do_not_shorten_each_other_without_an_end(monkeypatch):
+    V, F = meshes.grid(60, 60)
+    V = V * [1, 0.01, 1] + [0, 0, 1] * np.random.default_rng(1).standard_normal((len(V), 1))
+    sites, spread, rounds = some_sites(F, 4), polar._spread_from, []
+
+    def counted(*arguments):
+        rounds.append(1)
+        return spread(*arguments)
+
+    monkeypatch.setattr(polar, "_spread_from", counted)
+    pairs = seen(V, F, sites, 30.0)
+    few = len(rounds)
+    monkeypatch.setattr(polar, "MORE", 1.0)
+    exact = seen(V, F, sites, 30.0)
+    assert few < 0.6 * (len(rounds) - few)
+    apart = np.sqrt(pairs.squared) / np.sqrt(exact.squared) - 1
+    assert np.abs(apart).mean() < 1e-3

@@ -201,6 +201,15 @@ def test_a_coarse_mesh_has_the_landmarks_and_carries_all_others():
     assert np.allclose(mesh.carried(mesh.domain @ R.T, P), P @ R.T)
 
 
+def test_folds_all_over_are_left_where_nothing_is_around_them():
+    P, F = icosphere(2)
+    anywhere = np.random.default_rng(0).standard_normal(P.shape)
+    anywhere /= np.linalg.norm(anywhere, axis=1)[:, None]
+    with np.errstate(divide="raise", invalid="raise"):
+        found = drain(straightened(P, F, anywhere, np.zeros(len(P), bool)))
+    assert np.allclose(np.linalg.norm(found, axis=1), 1)
+
+
 def test_folds_are_straightened_and_what_is_held_stays():
     P, F = icosphere(3)
     rng = np.random.default_rng(0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mesh_checks import angles, topology
 
+from omt_uv.solver.analysis.feature_edges import region_borders
 from omt_uv.solver.errors import (
     MERGING,
     CountError,
@@ -18,6 +19,7 @@ from omt_uv.solver.errors import (
     OrientationError,
     PrecisionError,
 )
+from omt_uv.solver.mesh.cut_mesh import cut_open
 from omt_uv.solver.mesh.geometry import face_areas, halfedge_lengths, vertex_areas
 from omt_uv.solver.mesh.topology import boundary_loops, halfedges, pair_keys, twins
 from omt_uv.solver.progress import drain
@@ -107,6 +109,23 @@ def test_both_sides_of_a_cut_stay_on_one_another(make, alone):
         alone = 0
     count = np.unique(boundary, axis=0, return_counts=True)[1]
     assert len(boundary) > 30 and count.max() == 2 and (count == 1).sum() == alone
+
+
+@pytest.mark.parametrize("count_of", ["vertices", "faces"])
+@pytest.mark.parametrize("seed", [0, 9, 11])
+def test_counts_are_exact_where_a_rough_cut_keeps_more_vertices_than_were_planned(seed, count_of):
+    rng = np.random.default_rng(seed)
+    V, F = meshes.grid(15, 15)
+    V[:, 2] = 0.5 * rng.standard_normal(len(V))
+    part = V[F, 0].mean(axis=1) + 0.3 * rng.random(len(F)) > 0.6
+    sides = cut_open(V, F, region_borders(F, part)).sides
+    W = np.zeros((sides.max() + 1, 3))
+    W[sides] = V[F]
+    for count in (180, 220):
+        # An odd number of faces is kept, too.
+        count = count if count_of == "vertices" else 2 * count + 1
+        found = drain(remesh(RemeshSource(W, sides), count, RemeshOptions(count_of=count_of)))
+        assert len(getattr(found, "triangles" if count_of == "faces" else "vertices")) == count
 
 
 def test_points_of_the_input_under_the_new_vertices():

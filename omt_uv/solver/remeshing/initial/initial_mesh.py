@@ -9,8 +9,9 @@ import numpy as np
 from ...errors import CrowdedError, PrecisionError
 from ...mesh.charts import Chart
 from ...mesh.geometry import face_areas
-from ...mesh.topology import pair_keys
+from ...mesh.topology import pair_keys, paired
 from ...progress import Progress, Steps, part_of
+from ..components.coincident_boundaries import reopened_copies
 from ..edits.vertex_count import edge_length
 from ..edits.working_mesh import WorkingMesh
 from .arc_network import ArcSamples, ChartBoundary, chart_boundary
@@ -131,7 +132,7 @@ def _by_charts(
     plan = plan_samples(maps, count, density, at_vertices, options, line_spacing)
     network, component = plan.network, maps.component
     if options.any_mesh_will_do:
-        return _by_decimation_between_lines(maps, plan, density)
+        return _by_decimation_between_lines(maps, plan, density, count, options)
     boundaries = [chart_boundary(sides, plan.samples, network.arcs) for sides in network.sides]
     left = max(plan.vertex_count, plan.initial_vertex_count) - len(plan.samples.points)
     inner = _inner_counts(maps.charts, boundaries, density, left)
@@ -143,7 +144,8 @@ def _by_charts(
         steps = _chart_mesh(maps, k, loop, boundary, int(inner_count), density, options)
         chart_mesh, warnings = yield from part_of(steps, done, share)
         if chart_mesh is None:
-            return _by_decimation_between_lines(maps, replace(plan, warnings=(*plan.warnings, NO_MAPS)), density)
+            plan = replace(plan, warnings=(*plan.warnings, NO_MAPS))
+            return _by_decimation_between_lines(maps, plan, density, count, options)
         chart_meshes.append(chart_mesh)
         chart_warnings += warnings
         done += share
@@ -151,13 +153,24 @@ def _by_charts(
     return _stitched(maps, plan, points, triangles, chart_warnings, options.delaunay)
 
 
-def _by_decimation_between_lines(maps: ComponentMaps, plan: SamplePlan, density: np.ndarray) -> InitialMesh:
-    """The component by its own triangles, between the samples on its boundaries and features."""
-    component, count = maps.component, max(plan.vertex_count, plan.initial_vertex_count)
+def _by_decimation_between_lines(
+    maps: ComponentMaps, plan: SamplePlan, density: np.ndarray, count: int, options: RemeshOptions
+) -> InitialMesh:
+    """The component by its own triangles, between the samples on its boundaries and features, for a final `count` of
+    vertices or faces."""
+    component, at_first = maps.component, max(plan.vertex_count, plan.initial_vertex_count)
     mesh, to_reopen = decimated_between_lines(
-        component, plan.network.arcs, plan.samples, count, density, plan.initial_size
+        component, plan.network.arcs, plan.samples, at_first, density, plan.initial_size
     )
-    return _of_plan(maps, plan, mesh, to_reopen, maps.warnings + plan.warnings)
+    # Not every vertex between samples can collapse along its line, so that there may be more there than was planned.
+    boundary, on_boundary = mesh.twin < 0, np.zeros(len(mesh.points), dtype=bool)
+    on_boundary[mesh.triangles.ravel()[boundary]] = True
+    copies = reopened_copies(paired(to_reopen).ravel(), on_boundary)
+    vertex_count = count - copies
+    if not options.counts_vertices:
+        vertex_count = (count + int(boundary.sum())) // 2 + component.euler
+    start = _of_plan(maps, plan, mesh, to_reopen, maps.warnings + plan.warnings)
+    return replace(start, vertex_count=vertex_count, reopened_copies=copies)
 
 
 def _stitched(
