@@ -89,14 +89,14 @@ def _without(edges: np.ndarray, gone: np.ndarray, charts: list[Chart]) -> np.nda
     """Edges (e,2) without those with keys `gone` (g,), across which charts join, and without what was cut between or
     within these and hung on nothing else: a slit that floats in a chart opens nothing."""
     key, count = np.unique(np.concatenate([outline(chart) for chart in charts]), return_counts=True)
-    rim, inner = key[count == 1], np.setdiff1d(key[count > 1], gone)
-    ends = paired(np.concatenate([rim, inner]))
+    outer, inner = key[count == 1], np.setdiff1d(key[count > 1], gone)
+    ends = paired(np.concatenate([outer, inner]))
     nodes, end = np.unique(ends, return_inverse=True)
     one, other = end.reshape(-1, 2).T
     run = graph_components(one, other, len(nodes))[1][one]
-    # What is whole has no rim: the most that hangs together is what opens it.
-    anchored = run[: len(rim)] if len(rim) else np.bincount(run).argmax(keepdims=True) if len(run) else run
-    floating = inner[~np.isin(run[len(rim) :], anchored)]
+    # What is closed has no outline: the most that hangs together is what opens it.
+    anchored = run[: len(outer)] if len(outer) else np.bincount(run).argmax(keepdims=True) if len(run) else run
+    floating = inner[~np.isin(run[len(outer) :], anchored)]
     return edges[~np.isin(pair_keys(*edges.T), np.concatenate([gone, floating]))]
 
 

@@ -98,7 +98,7 @@ def test_of_two_borders_that_are_images_both_go_or_neither_does():
     assert len(asked) == 2
 
 
-def test_a_slit_goes_with_the_border_it_hung_on_and_one_from_the_rim_stays():
+def test_a_slit_goes_with_the_border_it_hung_on_and_one_from_the_outline_stays():
     search, floats, hangs = square(8), np.array([[40, 41], [41, 42]]), np.array([[26, 25], [25, 24]])
     asked = []
     joined_again(search, round_of(search, np.concatenate([column(8, 4), floats, hangs])), asked=asked)
@@ -117,12 +117,12 @@ def climbed(V, F, begin, steps, up):
 def test_of_a_closed_body_what_hangs_together_most_still_opens_it():
     V, F = meshes.icosphere(2)
     search = ShearSearch(triangle_surface(V, F), None, ShearBound(BOUND), None, {})
-    rim = boundary_edges(F[V[F].mean(axis=1)[:, 2] > 0])
-    long, short = climbed(V, F, int(rim[0, 0]), 3, 1), climbed(V, F, int(rim[-1, 0]), 2, -1)
-    edges = np.concatenate([rim, long, short])
+    outline = boundary_edges(F[V[F].mean(axis=1)[:, 2] > 0])
+    long, short = climbed(V, F, int(outline[0, 0]), 3, 1), climbed(V, F, int(outline[-1, 0]), 2, -1)
+    edges = np.concatenate([outline, long, short])
     charts = round_of(search, edges).charts
     assert len(charts) == 2
-    kept = rejoining._without(edges, pair_keys(*rim.T), charts)
+    kept = rejoining._without(edges, pair_keys(*outline.T), charts)
     assert edge_set(kept) == edge_set(long)
 
 

@@ -51,9 +51,9 @@ def test_what_is_led_along_edges_branches_and_closes_as_it_did(count, slits):
     component = short_cuts.component_of(*BODY)
     coarse = coarsening(component.positions, component.triangles, count // 4).ended(count)
     V, F = coarse.positions, coarse.triangles
-    rim = rim_of(triangle_surface(V, F), 0.1)
-    begins = [int(rim[0, 0]), int(rim[len(rim) // 2, 0])]
-    edges = np.concatenate([rim, *(walked(V, F, begin, 4, up) for begin, up in zip(begins, slits, strict=False))])
+    outline = outline_above(triangle_surface(V, F), 0.1)
+    begins = [int(outline[0, 0]), int(outline[len(outline) // 2, 0])]
+    edges = np.concatenate([outline, *(walked(V, F, begin, 4, up) for begin, up in zip(begins, slits, strict=False))])
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     found = component.ends[led_along(component, coarse, edges)]
     parts, loops, tips = shape_of(edges, len(V))
@@ -85,7 +85,7 @@ def found_by(monkeypatch, seams_of, rehearsed=1.0, **given):
     return component, plain, drain(search._searched(component, plain & False)), search
 
 
-def rim_of(surface, height):
+def outline_above(surface, height):
     """Edges (k,2) around what of a surface is above a height."""
     V, F = surface.positions, surface.corner_vertex[surface.triangles]
     return boundary_edges(F[V[F].mean(axis=1)[:, 2] > height])
@@ -93,7 +93,7 @@ def rim_of(surface, height):
 
 def loop(surface, avoid):
     """Seams around a small surface."""
-    return worked(rim_of(surface, 0.1))
+    return worked(outline_above(surface, 0.1))
 
 
 def test_seams_of_a_thinned_surface_take_the_place_of_what_was_found_first(monkeypatch):
@@ -106,7 +106,9 @@ def test_seams_of_a_thinned_surface_take_the_place_of_what_was_found_first(monke
 REFUSED = {
     "an error": lambda surface, avoid: worked(ZeroAreaFaceError("No face has an area", kind="face", elements=[0])),
     "no seams": lambda surface, avoid: worked(np.zeros((0, 2), np.int64)),
-    "no disks": lambda surface, avoid: worked(np.concatenate([rim_of(surface, 0.4), rim_of(surface, -0.4)])),
+    "no disks": lambda surface, avoid: worked(
+        np.concatenate([outline_above(surface, 0.4), outline_above(surface, -0.4)])
+    ),
 }
 
 
