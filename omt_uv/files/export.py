@@ -49,7 +49,7 @@ def _select_only(objects: Objects) -> None:
 
 
 def _write_obj(path: Path, objects: Objects, everything: bool) -> list[str]:
-    """Write an OBJ file; returns no warnings."""
+    """Write an OBJ file; returns warnings."""
     objects = exported_meshes(objects, everything)
     _select_only(objects)
     materials = any(obj.data.materials for obj in objects)
@@ -66,9 +66,7 @@ def _write_obj(path: Path, objects: Objects, everything: bool) -> list[str]:
             **AXES,
         )
     restore_precision(path, objects)
-    if materials and not ordered:
-        name_materials(path, objects)
-    return []
+    return name_materials(path, objects) if materials and not ordered else []
 
 
 def _materials_ascend(mesh: bpy.types.Mesh) -> bool:

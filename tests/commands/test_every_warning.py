@@ -175,6 +175,25 @@ def unlike_attributes(scene):
         assert ["heat" in mesh.attributes for mesh in meshes] == [not left] * 2
 
 
+@says("files/obj_materials.py", "Materials of {} were left out of the OBJ file")
+def materials_left_out(scene):
+    """Of objects that have one name in the file, faces are not told apart."""
+    import bpy
+
+    module, objects = scene.module("files.export"), []
+    material = bpy.data.materials.new("a")
+    for names, told in ((("A b",), []), (("A b", "A_b"), ["Materials of 2 objects were left out of the OBJ file"])):
+        objects = [scenes.add(*SQUARE, name) for name in names]
+        for obj in objects:
+            obj.name = names[objects.index(obj)]
+            for slot in (material, None):
+                obj.data.materials.append(slot)
+            obj.data.polygons.foreach_set("material_index", (1, 0))
+        yield module._write_obj(scene.folder / "a.obj", objects, False), told
+        for obj in objects:
+            bpy.data.objects.remove(obj)
+
+
 @says("files/export.py", "STL files hold no UVs")
 def left_out_of_a_format(scene):
     module = scene.module("files.export")

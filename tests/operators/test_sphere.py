@@ -169,12 +169,18 @@ def two_fans():
     return scenes.add(joined, np.concatenate([F, other]), "Fans")
 
 
+def test_balls_that_touch_in_a_vertex_have_the_whole_texture_each():
+    fans = two_fans()
+    assert bpy.ops.uv.omt_sphere() == {"FINISHED"}
+    one, other = np.split(scenes.uv_of(fans), 2)
+    assert all(np.ptp(uv, axis=0).min() > 0.5 for uv in (one, other))
+
+
 @pytest.mark.parametrize(
     ("make", "message", "kind"),
     [
         (open_ball, "not closed", "edges"),
         (torus, "a handle", "polygons"),
-        (two_fans, "fans of faces", "vertices"),
         (scenes.bump, "not closed", "edges"),
     ],
 )

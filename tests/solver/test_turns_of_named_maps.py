@@ -317,7 +317,7 @@ def test_first_meshes_by_charts_are_stitched_unless_one_has_no_map(fails, monkey
     monkeypatch.setattr(
         initial_mesh, "_stitched", lambda maps, plan, points, triangles, told, delaunay: (triangles, told)
     )
-    monkeypatch.setattr(initial_mesh, "_by_decimation_between_lines", lambda maps, plan, density: plan.warnings)
+    monkeypatch.setattr(initial_mesh, "_by_decimation_between_lines", lambda maps, plan, *_: plan.warnings)
     options = SimpleNamespace(any_mesh_will_do=False, delaunay=True)
     found, fractions = told(initial_mesh._by_charts(maps, 40, None, None, options, 1.0))
     # Of the sixty at first ten are there on lines.

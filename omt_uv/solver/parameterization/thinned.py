@@ -44,11 +44,12 @@ class ThinnedSearch(SeamSearch):
     thinned: list[np.ndarray] | None = None
 
     def _searched(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
+        if self.seams_of is None or self.thinned is None or not self._may_be_thinned(component):
+            return (yield from super()._searched(component, base))
         edges = yield from part_of(super()._searched(component, base), 0.0, RUN)
         name = fingerprint(component)
         found = self.memory.get(name)
-        is_crowded = found is not None and (found.rehearsed or 0.0) > CROWDED * self.asked
-        if not is_crowded or self.seams_of is None or self.thinned is None or not self._may_be_thinned(component):
+        if found is None or (found.rehearsed or 0.0) <= CROWDED * self.asked:
             return edges
         thinned = yield from part_of(self._of_thinned(self.priced(component), self.seams_of), RUN, 1 - RUN)
         if thinned is None:
