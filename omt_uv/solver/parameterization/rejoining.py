@@ -71,23 +71,25 @@ def rejoined(
         size = sum(len(chart.vertices) for chart in among)
         if size > left:
             break
-        kept = _without(last.cuts.edges, np.concatenate([pair_keys(*one.edges.T) for one in both]), among)
         most = last.cuts.length - SAVED * sum(one.length for one in both)
-        try:
-            new = yield from part_of(cut(last, kept, most), trial / MOST_TRIALS, 1 / MOST_TRIALS)
-        except MeshError:
-            # The charts that there are have maps.
-            continue
-        if new is None:
-            break
-        left -= 0 if new is last else size
-        last = new if _is_sound(search, last, new) else last
+        for kept in _ways(last.cuts.edges, np.concatenate([pair_keys(*one.edges.T) for one in both]), among):
+            try:
+                new = yield from part_of(cut(last, kept, most), trial / MOST_TRIALS, 1 / MOST_TRIALS)
+            except MeshError:
+                # The charts that there are have maps.
+                continue
+            if new is None:
+                return last
+            left -= 0 if new is last else size
+            if _is_sound(search, last, new):
+                last = new
+                break
     return last
 
 
-def _without(edges: np.ndarray, gone: np.ndarray, charts: list[Chart]) -> np.ndarray:
-    """Edges (e,2) without those with keys `gone` (g,), across which charts join, and without what was cut between or
-    within these and hung on nothing else: a slit that floats in a chart opens nothing."""
+def _ways(edges: np.ndarray, gone: np.ndarray, charts: list[Chart]) -> list[np.ndarray]:
+    """Edges (e,2) without those with keys `gone` (g,), across which charts join: first without what was cut between or
+    within these and hung on nothing else, too, since a slit amid a chart is a hole in its map; then with that."""
     key, count = np.unique(np.concatenate([outline(chart) for chart in charts]), return_counts=True)
     outer, inner = key[count == 1], np.setdiff1d(key[count > 1], gone)
     ends = paired(np.concatenate([outer, inner]))
@@ -97,7 +99,8 @@ def _without(edges: np.ndarray, gone: np.ndarray, charts: list[Chart]) -> np.nda
     # What is closed has no outline: the most that hangs together is what opens it.
     anchored = run[: len(outer)] if len(outer) else np.bincount(run).argmax(keepdims=True) if len(run) else run
     floating = inner[~np.isin(run[len(outer) :], anchored)]
-    return edges[~np.isin(pair_keys(*edges.T), np.concatenate([gone, floating]))]
+    keys = pair_keys(*edges.T)
+    return [edges[~np.isin(keys, each)] for each in (np.union1d(gone, floating), gone)[len(floating) == 0 :]]
 
 
 def _key(border: Border) -> bytes:

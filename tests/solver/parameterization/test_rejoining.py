@@ -101,8 +101,13 @@ def test_of_two_borders_that_are_images_both_go_or_neither_does():
 def test_a_slit_goes_with_the_border_it_hung_on_and_one_from_the_outline_stays():
     search, floats, hangs = square(8), np.array([[40, 41], [41, 42]]), np.array([[26, 25], [25, 24]])
     asked = []
-    joined_again(search, round_of(search, np.concatenate([column(8, 4), floats, hangs])), asked=asked)
+    last = round_of(search, np.concatenate([column(8, 4), floats, hangs]))
+    assert edge_set(joined_again(search, last, asked=asked).cuts.edges) == edge_set(hangs)
     assert asked == [edge_set(hangs)]
+    # What helps stays where nothing is gained without it.
+    asked = []
+    joined_again(search, last, shear=1.31, asked=asked)
+    assert asked == [edge_set(hangs), edge_set(np.concatenate([floats, hangs]))]
 
 
 def climbed(V, F, begin, steps, up):
@@ -122,8 +127,8 @@ def test_of_a_closed_body_what_hangs_together_most_still_opens_it():
     edges = np.concatenate([outline, long, short])
     charts = round_of(search, edges).charts
     assert len(charts) == 2
-    kept = rejoining._without(edges, pair_keys(*outline.T), charts)
-    assert edge_set(kept) == edge_set(long)
+    ways = rejoining._ways(edges, pair_keys(*outline.T), charts)
+    assert [edge_set(way) for way in ways] == [edge_set(long), edge_set(np.concatenate([long, short]))]
 
 
 def test_what_was_apart_before_stays():

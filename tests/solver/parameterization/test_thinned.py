@@ -103,17 +103,28 @@ def test_seams_of_a_thinned_surface_take_the_place_of_what_was_found_first(monke
     assert not search.memory and np.array_equal(*search.thinned, component.polygons)
 
 
+def test_a_slit_that_hangs_on_no_other_seam_is_left_out(monkeypatch):
+    def seams_of(surface, avoid):
+        V, F = surface.positions, surface.corner_vertex[surface.triangles]
+        outline = outline_above(surface, 0.1)
+        return worked(np.concatenate([outline, walked(V, F, int(np.argmax(V[:, 2])), 2, -1)]))
+
+    component, _, edges, _ = found_by(monkeypatch, seams_of)
+    parts, loops, tips = shape_of(component.ends[edges], component.vertex_count)
+    assert (parts, loops, tips) == (1, 1, set())
+
+
 REFUSED = {
     "an error": lambda surface, avoid: worked(ZeroAreaFaceError("No face has an area", kind="face", elements=[0])),
     "no seams": lambda surface, avoid: worked(np.zeros((0, 2), np.int64)),
-    "no disks": lambda surface, avoid: worked(
-        np.concatenate([outline_above(surface, 0.4), outline_above(surface, -0.4)])
-    ),
+    "no disks": loop,
 }
 
 
 @pytest.mark.parametrize("seams_of", [*REFUSED.values(), None], ids=[*REFUSED, "nobody to ask"])
 def test_what_is_no_use_leaves_what_was_found_first(monkeypatch, seams_of):
+    if seams_of is loop:
+        monkeypatch.setattr(thinned, "led_along", lambda component, *_: np.zeros(len(component.ends), bool))
     _, plain, edges, search = found_by(monkeypatch, seams_of)
     assert np.array_equal(edges, plain) and len(search.memory) == 1 and not search.thinned
 
