@@ -24,13 +24,13 @@ from ..seams.coarse_surface import COMMON, coarsening
 from ..seams.fine_paths import led_along
 from ..seams.search import SeamSearch
 
-# Parts with more vertices are thinned, to so many.
+# Parts with more vertices are thinned, to so many,
 LARGE = 100_000
 THINNED = 20_000
+# where a rehearsal has so many times the square of log(shear) that is asked for.
+CROWDED = 1.15
 # Where the time goes, roughly: that of the search that tells whether it is.
 RUN = 0.3
-# They are where a rehearsal has so many times the square of log(shear) that is asked for.
-CROWDED = 1.15
 
 
 @dataclass(frozen=True)
