@@ -234,6 +234,15 @@ def torus(major=24, minor=12, radius=0.4):
 # ---- polygons -----------------------------------------------------------------------------------------------
 
 
+def climbed(V, F, begin, steps, up):
+    """Edges (steps,2) of a mesh from a vertex to where it goes most up (1) or down (-1)."""
+    ends, path = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), [begin]
+    for _ in range(steps):
+        beside = ends[ends[:, 0] == path[-1], 1]
+        path.append(int(beside[np.argmax(up * V[beside, 2])]))
+    return np.stack([path[:-1], path[1:]], axis=1)
+
+
 def polygon_surface(V, polygons, seams=()):
     """The `Surface` of a polygon mesh, polygons (lists of vertices) cut into fans of triangles."""
     from omt_uv.solver.mesh.surface import Surface

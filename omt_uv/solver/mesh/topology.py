@@ -242,6 +242,13 @@ def graph_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndar
     )
 
 
+def edge_runs(ends: np.ndarray) -> np.ndarray:
+    """The run (e,) that each of the edges (e,2) between nodes, which may have any numbers, hangs together with."""
+    nodes, end = np.unique(ends, return_inverse=True)
+    one, other = end.reshape(-1, 2).T
+    return graph_components(one, other, len(nodes))[1][one]
+
+
 def _few_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndarray]:
     """The same by pointer doubling: to make a sparse matrix of a small graph takes longer than to walk through it."""
     root = np.arange(n)

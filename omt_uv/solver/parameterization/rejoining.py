@@ -17,7 +17,7 @@ from ..analysis.symmetry_plane import MirrorImages
 from ..errors import MeshError
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
-from ..mesh.topology import graph_components, pair_keys, paired
+from ..mesh.topology import edge_runs, pair_keys, paired
 from ..progress import Steps, part_of
 from ..seams.limbs import may_come_apart
 from .chart_indices import outline
@@ -92,10 +92,7 @@ def _ways(edges: np.ndarray, gone: np.ndarray, charts: list[Chart]) -> list[np.n
     within these and hung on nothing else, too, since a slit amid a chart is a hole in its map; then with that."""
     key, count = np.unique(np.concatenate([outline(chart) for chart in charts]), return_counts=True)
     outer, inner = key[count == 1], np.setdiff1d(key[count > 1], gone)
-    ends = paired(np.concatenate([outer, inner]))
-    nodes, end = np.unique(ends, return_inverse=True)
-    one, other = end.reshape(-1, 2).T
-    run = graph_components(one, other, len(nodes))[1][one]
+    run = edge_runs(paired(np.concatenate([outer, inner])))
     # What is closed has no outline: the most that hangs together is what opens it.
     anchored = run[: len(outer)] if len(outer) else np.bincount(run).argmax(keepdims=True) if len(run) else run
     floating = inner[~np.isin(run[len(outer) :], anchored)]
@@ -115,9 +112,7 @@ def _borders(search: ShearSearch, last: Round, between: np.ndarray) -> list[Bord
     key, charts = key[cut], charts[cut]
     edges, pair = paired(key), np.unique(pair_keys(*charts.T), return_inverse=True)[1].ravel()
     # Runs of edges that hang together, of every two charts by themselves.
-    nodes, end = np.unique(pair[:, None] * len(search.surface.positions) + edges, return_inverse=True)
-    one, other = end.reshape(-1, 2).T
-    run = graph_components(one, other, len(nodes))[1][one]
+    run = edge_runs(pair[:, None] * len(search.surface.positions) + edges)
     length, side = np.bincount(run, edge_lengths(search.surface.positions, edges)), np.sqrt(last.area)
     found = dict[frozenset[int], Border]()
     for k in np.argsort(-length, kind="stable"):

@@ -18,7 +18,7 @@ from ..errors import MeshError
 from ..mesh.charts import check_disks, strict_charts
 from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface, is_sharp, triangle_surface
-from ..mesh.topology import graph_components, pair_keys
+from ..mesh.topology import edge_runs, pair_keys
 from ..progress import Steps, part_of
 from ..seams.coarse_surface import COMMON, coarsening
 from ..seams.fine_paths import led_along
@@ -87,9 +87,7 @@ class ThinnedSearch(SeamSearch):
         if not len(seams):
             return None
         # Where charts are disks, all seams hang together: another one is a slit in a face, which was filled.
-        n = len(coarse.kept)
-        one, other = np.where(coarse.boundary[seams], n, seams).T
-        run = graph_components(one, other, n + 1)[1][one]
+        run = edge_runs(np.where(coarse.boundary[seams], len(coarse.kept), seams))
         seams = seams[run == np.bincount(run, edge_lengths(coarse.positions, seams)).argmax()]
         edges = led_along(component, coarse, seams)
         cut = replace(triangle_surface(component.positions, component.triangles), seams=component.ends[edges])

@@ -138,18 +138,24 @@ def leaves(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
     return found
 
 
+def between_nodes(ends: np.ndarray, node: np.ndarray) -> np.ndarray:
+    """The stretch (k,) that each of the steps with these ends (k,2) is in, joined through vertices that are no nodes
+    (n,) bool; some numbers are those of none."""
+    n, k = len(node), len(ends)
+    # Each step has a place of its own for its ends at nodes.
+    place = np.where(node[ends], n + np.arange(2 * k).reshape(k, 2), ends)
+    return graph_components(place[:, 0], place[:, 1], n + 2 * k)[1][place[:, 0]]
+
+
 def _by_stretch(graph: PathGraph, steps: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
     """Stretches, and how many steps meet at every vertex (n,)."""
-    k, n = len(steps), len(graph.boundary)
     ends = graph.ends[steps]
-    degree = np.bincount(ends.ravel(), minlength=n)
+    degree = np.bincount(ends.ravel(), minlength=len(graph.boundary))
     node = (degree != 2) | graph.boundary
     # Where a path leaves the mirror plane, its mirror image branches off.
     leaving = graph.in_plane[ends[:, 0]] != graph.in_plane[ends[:, 1]]
     node[ends[leaving][graph.in_plane[ends[leaving]]]] = True
-    # Steps are joined through vertices that are no nodes; each has a place of its own for its ends at nodes.
-    place = np.where(node[ends], n + np.arange(2 * k).reshape(k, 2), ends)
-    label = graph_components(place[:, 0], place[:, 1], n + 2 * k)[1][place[:, 0]]
+    label = between_nodes(ends, node)
     total = np.bincount(label, graph.cost[steps])
     order = np.argsort(-total, kind="stable")[: np.count_nonzero(np.bincount(label))]
     return [steps[label == c] for c in order], degree

@@ -15,7 +15,7 @@ from ..cutting.component import CutComponent
 from ..mesh.geometry import edge_lengths
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .coarse_surface import CoarseSurface
-from .cut_tree import stretches
+from .cut_tree import between_nodes, stretches
 from .path_graph import PathGraph, path_to
 
 # How far from the coarse path a fine one may run, in lengths of coarse edges.
@@ -150,9 +150,7 @@ def _chains(edges: np.ndarray, boundary: np.ndarray) -> list[np.ndarray]:
     chains, waiting = list[np.ndarray](), [edges]
     while waiting:
         part = waiting.pop()
-        # Each edge has a place of its own for its ends at nodes.
-        place = np.where(node[part], n + np.arange(part.size).reshape(part.shape), part)
-        label = graph_components(place[:, 0], place[:, 1], n + part.size)[1][place[:, 0]]
+        label = between_nodes(part, node)
         for k in np.unique(label):
             chain = part[label == k]
             ends = np.unique(chain[node[chain]])

@@ -110,20 +110,11 @@ def test_a_slit_goes_with_the_border_it_hung_on_and_one_from_the_outline_stays()
     assert asked == [edge_set(hangs), edge_set(np.concatenate([floats, hangs]))]
 
 
-def climbed(V, F, begin, steps, up):
-    """Edges (steps,2) from a vertex to where it goes most up (1) or down (-1)."""
-    ends, path = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), [begin]
-    for _ in range(steps):
-        beside = ends[ends[:, 0] == path[-1], 1]
-        path.append(int(beside[np.argmax(up * V[beside, 2])]))
-    return np.stack([path[:-1], path[1:]], axis=1)
-
-
 def test_of_a_closed_body_what_hangs_together_most_still_opens_it():
     V, F = meshes.icosphere(2)
     search = ShearSearch(triangle_surface(V, F), None, ShearBound(BOUND), None, {})
     outline = boundary_edges(F[V[F].mean(axis=1)[:, 2] > 0])
-    long, short = climbed(V, F, int(outline[0, 0]), 3, 1), climbed(V, F, int(outline[-1, 0]), 2, -1)
+    long, short = meshes.climbed(V, F, int(outline[0, 0]), 3, 1), meshes.climbed(V, F, int(outline[-1, 0]), 2, -1)
     edges = np.concatenate([outline, long, short])
     charts = round_of(search, edges).charts
     assert len(charts) == 2

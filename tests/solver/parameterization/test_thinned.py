@@ -5,6 +5,7 @@ from functools import cache
 from types import SimpleNamespace
 
 import bodies
+import meshes
 import numpy as np
 import pytest
 import short_cuts
@@ -36,15 +37,6 @@ def shape_of(edges, n):
     return parts, len(edges) - len(vertices) + parts, set(vertices[degree == 1].tolist())
 
 
-def walked(V, F, begin, steps, up):
-    """Edges (steps,2) from a vertex to where it goes most up (1) or down (-1)."""
-    ends, path = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), [begin]
-    for _ in range(steps):
-        beside = ends[ends[:, 0] == path[-1], 1]
-        path.append(int(beside[np.argmax(up * V[beside, 2])]))
-    return np.stack([path[:-1], path[1:]], axis=1)
-
-
 @pytest.mark.parametrize("count", [150, 400, len(BODY[0])])
 @pytest.mark.parametrize("slits", [(), (1,), (1, -1)])
 def test_what_is_led_along_edges_branches_and_closes_as_it_did(count, slits):
@@ -53,7 +45,9 @@ def test_what_is_led_along_edges_branches_and_closes_as_it_did(count, slits):
     V, F = coarse.positions, coarse.triangles
     outline = outline_above(triangle_surface(V, F), 0.1)
     begins = [int(outline[0, 0]), int(outline[len(outline) // 2, 0])]
-    edges = np.concatenate([outline, *(walked(V, F, begin, 4, up) for begin, up in zip(begins, slits, strict=False))])
+    edges = np.concatenate(
+        [outline, *(meshes.climbed(V, F, begin, 4, up) for begin, up in zip(begins, slits, strict=False))]
+    )
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     found = component.ends[led_along(component, coarse, edges)]
     parts, loops, tips = shape_of(edges, len(V))
@@ -107,7 +101,7 @@ def test_a_slit_that_hangs_on_no_other_seam_is_left_out(monkeypatch):
     def seams_of(surface, avoid):
         V, F = surface.positions, surface.corner_vertex[surface.triangles]
         outline = outline_above(surface, 0.1)
-        return worked(np.concatenate([outline, walked(V, F, int(np.argmax(V[:, 2])), 2, -1)]))
+        return worked(np.concatenate([outline, meshes.climbed(V, F, int(np.argmax(V[:, 2])), 2, -1)]))
 
     component, _, edges, _ = found_by(monkeypatch, seams_of)
     parts, loops, tips = shape_of(component.ends[edges], component.vertex_count)
