@@ -71,7 +71,7 @@ def rejoined(
         size = sum(len(chart.vertices) for chart in among)
         if size > left:
             break
-        most = last.cuts.length - SAVED * sum(one.length for one in both)
+        most, mapped = last.cuts.length - SAVED * sum(one.length for one in both), False
         for kept in _ways(last.cuts.edges, np.concatenate([pair_keys(*one.edges.T) for one in both]), among):
             try:
                 new = yield from part_of(cut(last, kept, most), trial / MOST_TRIALS, 1 / MOST_TRIALS)
@@ -80,10 +80,12 @@ def rejoined(
                 continue
             if new is None:
                 return last
-            left -= 0 if new is last else size
+            mapped |= new is not last
             if _is_sound(search, last, new):
                 last = new
                 break
+        # However many ways there were, so that whether the first will do does not decide which joints are tried.
+        left -= size * mapped
     return last
 
 

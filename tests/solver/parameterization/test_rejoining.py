@@ -183,6 +183,17 @@ def test_no_more_is_tried_than_is_worth_the_time(monkeypatch):
     assert counts == [3, 11, 6]
 
 
+def test_a_second_way_to_join_two_charts_takes_nothing_from_those_that_come_after(monkeypatch):
+    """However it ended: with and without what floats within, the next border is tried all the same."""
+    search, floats = square(12), np.array([[18, 17], [17, 16]])
+    monkeypatch.setattr(rejoining, "MOST_MAPPED", 300)
+    for slits in (floats[:0], floats):
+        asked = []
+        last = round_of(search, np.concatenate([column(12, 5), column(12, 9), slits]))
+        joined_again(search, last, shear=1.31, asked=asked)
+        assert len(asked) == 2 + len(slits) // 2
+
+
 def test_a_round_that_misses_the_bound_is_left_alone():
     search, asked = square(8), []
     last = round_of(search, column(8, 4), (1.5, 1.1))
