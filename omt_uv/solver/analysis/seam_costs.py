@@ -6,6 +6,7 @@ fully. The factors of an edge multiply, within bounds, so that no seam becomes m
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..errors import ZeroAreaFaceError
 from ..mesh.geometry import halfedge_lengths, unit, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
-from ..mesh.topology import halfedges, pair_keys, pair_up, paired
+from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, paired
 from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards, with_a_face
 from .feature_edges import fold_angles
 from .occlusion import hidden_sides, outside_out, vertex_occlusion
@@ -46,6 +47,12 @@ LEVEL = 0.95
 CHANCE = NEAR / 2
 # A vertex is in a face if it is so with more than this certainty.
 IN_FACE = 0.5
+# A part of several may have a face of its own if it has this share of the area, and lies across the mirror plane: its
+# middle is off that by no more than this share of what its vertices are.
+LARGE = 0.02
+ACROSS = 0.1
+# It has one with more certainty than the front view alone gives.
+FACED = 0.7
 # Triangles that pair up to quads across their longest sides, of all: so many come from quads and not by chance.
 PAIRED = 0.9
 EQUAL = 1 - 1e-6
@@ -204,18 +211,22 @@ def _vertex_reasons(
     saliency = saliency_of(means, triangles)
     seen = facing(positions, triangles, saliency, plane, axes)
     occlusion = vertex_occlusion(positions, triangles, sides)
-    sure = seen.certainty * with_a_face(positions, triangles, seen)
-    forwards = sure * towards(positions, triangles, seen.front)
+    forwards, far_ahead, backwards = _looks(positions, triangles, seen)
+    for part, corners in _middle_parts(positions, triangles, plane):
+        own = facing(unit_size(positions[part], corners), corners, saliency[part], plane, axes)
+        if own.certainty > max(seen.certainty, FACED):
+            for look, here in zip((forwards, far_ahead, backwards), _looks(positions[part], corners, own), strict=True):
+                look[part] = here
     below = towards(positions, triangles, -seen.up)
     # Sockets and nostrils are hidden from most sides, but not from the front, from where a face is looked at.
     front = _step(forwards, SIDE) * (1 - _step(occlusion, BURIED))
-    face = np.maximum(front, _step(sure * ahead(positions, triangles, seen.front), SIDE))
+    face = np.maximum(front, _step(far_ahead, SIDE))
     hidden = _step(occlusion, HIDDEN) * (1 - front)
     reasons = {
         "hidden": hidden,
         "crease": _step(-means[CREASE_SCALE], CREASE) * (1 - front),
         "underside": _step(below, SIDE),
-        "back": _step(-seen.certainty * towards(positions, triangles, seen.front), SIDE),
+        "back": _step(backwards, SIDE),
         "front": front,
         "salient": salient_weights(saliency, area, SALIENT) * (1 - hidden),
         "mirror": np.zeros(n),
@@ -224,6 +235,32 @@ def _vertex_reasons(
         "within": face * (occlusion > BURIED[0]),
     }
     return seen, reasons
+
+
+def _looks(positions: np.ndarray, triangles: np.ndarray, seen: Facing) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far vertices (n,) of a surface (n,3), (m,3) look and lie to where it has a face, lie there, and look back."""
+    there = towards(positions, triangles, seen.front)
+    sure = seen.certainty * with_a_face(positions, triangles, seen)
+    return sure * there, sure * ahead(positions, triangles, seen.front), -seen.certainty * there
+
+
+def _middle_parts(
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane | None
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The vertices (k,) and triangles (l,3) of these of the large parts of a surface (n,3), (m,3) of several that lie
+    across its mirror plane, as the head of a body with clothes and hair: that has a face though all of it has none."""
+    if plane is None:
+        return
+    part = graph_components(*halfedges(triangles), len(positions))[1]
+    area, height = vertex_areas(positions, triangles), plane.distance(positions)
+    share = np.bincount(part, area) / area.sum()
+    if np.count_nonzero(share) == 1:
+        return
+    off = np.abs(np.bincount(part, area * height)) / np.maximum(np.bincount(part, area * np.abs(height)), 1e-300)
+    for k in np.flatnonzero((share >= LARGE) & (off <= ACROSS)):
+        vertices = np.flatnonzero(part == k)
+        inside = triangles[part[triangles[:, 0]] == k]
+        yield vertices, np.searchsorted(vertices, inside)
 
 
 def _symmetrise(

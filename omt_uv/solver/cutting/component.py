@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -359,6 +360,14 @@ class SideFinder(Protocol):
     @property
     def asked(self) -> float:
         """The square of log(shear) that maps may have; 0 where nobody asks."""
+
+    @property
+    def pockets(self) -> Callable[[], np.ndarray]:
+        """Gives the edges (k,2) of the surface around pockets of faces, when those are needed."""
+
+    @property
+    def pocketed(self) -> np.ndarray:
+        """Those (k,2) that are cut whatever lies beside them."""
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""

@@ -25,7 +25,7 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
 from .gluing_facts import TurningLines, cost_factors, in_unit_box, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
-from .hole_filling import MANY, fill_holes, level_parts, sieved
+from .hole_filling import MANY, around_pockets, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
 from .steiner_points import MOST_ENDS, branching_tree
 from .symmetric_cut import outlined_cut, symmetric_cut, symmetric_halves
@@ -173,8 +173,11 @@ def cut_gluing(
     if sieve is not None:
         gone = partition_pairs(gluing, positions, one_sided)
     crowded = bool(gone.any())
-    if search is not None and avoid is None and not search.stays_whole:
-        gone |= hard_borders(surface, gluing, positions, gone, search)
+    if search is not None:
+        comes_apart = avoid is None and not search.stays_whole
+        if comes_apart:
+            gone |= hard_borders(surface, gluing, positions, gone, search)
+        gone |= around_pockets(surface, gluing, positions, gone, search, comes_apart)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
     holes, sieves, level = 0, not fill, np.zeros(len(gluing.triangles), dtype=bool)

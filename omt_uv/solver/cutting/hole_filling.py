@@ -1,4 +1,5 @@
-"""Fill holes with fans, for the map only, so that eyes and nostrils do not tear a face apart.
+"""Fill holes with fans, for the map only, so that eyes and nostrils do not tear a face apart; and take pockets off that
+would.
 
 Every hole gets a fan of triangles around a new vertex. In the gluing they are triangles of polygon -1, on corners and
 vertices after those of the surface.
@@ -14,11 +15,11 @@ import numpy as np
 from ..analysis.seam_costs import SeamCosts
 from ..errors import plural
 from ..mesh.geometry import face_areas, face_normals, lengths, unit
-from ..mesh.gluing import Gluing, components, corner_classes
+from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import graph_components, halfedges, pair_keys
-from .component import NOISE
-from .gluing_facts import in_unit_box, total_curvature
+from .component import NOISE, SideFinder
+from .gluing_facts import in_unit_box, marked_triangles, total_curvature
 
 NO_POLYGON = -1
 # Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a component is a sieve.
@@ -36,6 +37,8 @@ OUTSTANDING = 3.0
 SHORT = 0.5
 FORWARDS = 0.5
 SMOOTH = 0.7
+# A component with no more curvature than a sphere has no pocket, but for noise.
+POCKETED = 4.1 * np.pi
 
 
 @dataclass(frozen=True)
@@ -236,3 +239,23 @@ def _fans(surface, gluing, boundary, loop, tail, head, size) -> Filled:
     )
     positions = np.concatenate([surface.positions, centre])
     return Filled(replace(surface, positions=positions, corner_vertex=extended.vertex), extended, len(count))
+
+
+def around_pockets(
+    surface: Surface, gluing: Gluing, positions: np.ndarray, gone: np.ndarray, search: SideFinder, anew: bool
+) -> np.ndarray:
+    """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, around pockets in faces: those that came off
+    before, and anew those of components that are searched; positions (n,3) in a unit box."""
+    keys = pair_keys(*gluing.ends(gluing.first))
+    before = np.isin(keys, pair_keys(*search.pocketed.T))
+    left = gluing.without(gone | before)
+    component_of, chosen = components(left), list[int]()
+    if anew:
+        curved = total_curvature(left, corner_classes(left), component_of, positions) > POCKETED
+        marked = np.isin(np.arange(len(curved)), component_of[marked_triangles(surface, left)])
+        members = groups(component_of)
+        chosen = [k for k in np.flatnonzero(curved) if search.wants(left.owner[members[k]], bool(marked[k]))]
+    if not chosen:
+        return before
+    around = np.isin(keys, pair_keys(*search.pockets().T))
+    return before | (around & np.isin(component_of[gluing.first // 3], chosen))

@@ -243,6 +243,7 @@ def _cut_anew(search: ShearSearch, last: Round, asked: Asked, map_charts, early:
         return None
     edges = np.concatenate([asked.kept, again.found_cuts.edges])
     if not asked.is_worth(edges):
+        last.tell_stuck(memory)
         return last
     mapping = mapped_anew(again.charts, list(zip(last.charts, last.maps, strict=True)), map_charts)
     mapped = yield from unless_ended(part_of(mapping, SEARCHING, 1 - SEARCHING), early)

@@ -107,6 +107,7 @@ class ShearSearch:
             borders=self.borders,
             seams_of=self.seams_of,
             thinned=self.thinned,
+            pockets=lambda: self.pockets,
         )
 
     def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
@@ -151,8 +152,10 @@ class ShearSearch:
 
     def _cut(self, kept: np.ndarray, search: SeamSearch) -> Steps[DiskCharts]:
         """Charts with edges (k,2) that stay cut, and those that a search finds."""
-        surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
-        return disk_charts(surface, self.faces, search=search, **self.cutting)
+        # Nobody has marked what pockets came off along.
+        own = np.isin(pair_keys(*kept.T), pair_keys(*self.__dict__.get("pockets", NO_EDGES).T))
+        surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept[~own]]))
+        return disk_charts(surface, self.faces, search=replace(search, pocketed=kept[own]), **self.cutting)
 
     def _twins(self, charts: list[Chart]) -> np.ndarray:
         """The number (k,) of the chart before each of which it is the mirror image, vertex by vertex; -1 for none."""
@@ -201,6 +204,13 @@ class ShearSearch:
         return TurnedCopies(), TurnedCopies()
 
     @cached_property
+    def pockets(self) -> np.ndarray:
+        """The edges (k,2) around pockets of faces, which come apart before any search."""
+        from .pockets import pocket_borders
+
+        return pocket_borders(self.surface, self.faces, self.costs())
+
+    @cached_property
     def thinned(self) -> list[np.ndarray]:
         """Polygons (k,) of parts whose seams were found on thinned surfaces, with all that was tried of maps."""
         return []
@@ -212,10 +222,8 @@ class ShearSearch:
     @cached_property
     def images(self) -> MirrorImages | None:
         """The mirror images of the vertices of the surface; None without a mirror."""
-        plane = self.costs().plane
-        if plane is None:
-            return None
-        return plane.images(self.surface.positions, self.surface.corner_vertex[self.surface.triangles])
+        plane, triangles = self.costs().plane, self.surface.corner_vertex[self.surface.triangles]
+        return None if plane is None else plane.images(self.surface.positions, triangles)
 
     @cached_property
     def _costs(self) -> SeamCosts:
@@ -348,6 +356,11 @@ class Round:
         """What searches have found for chart k as a whole."""
         faces = np.unique(self.charts[k].faces)
         return [one for one in self.memory.values() if np.array_equal(np.unique(one.polygons), faces)]
+
+    def tell_stuck(self, memory: dict) -> None:
+        """Remember for what a search whose seams were tried before found no more: asked for more it finds the same."""
+        stuck = {name for name, found in memory.items() if found.is_stuck}
+        self.memory.update({name: replace(one, is_stuck=True) for name, one in self.memory.items() if name in stuck})
 
     def to_be_searched(self, apart: dict[int, np.ndarray]) -> list[int]:
         """Charts to be searched again: not what comes apart, nor where a search has hardly got on, since such searches

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -92,6 +93,7 @@ class SeamSearch:
     rehearsed : what it has given
     copies : the parts that this search, and none that it was made from, has found seams for
     borders : parts and where they come apart at hard edges, as they are and as drawn, to which this search adds
+    pockets : gives the edges (k,2) around pockets of faces, when those are needed; pocketed (k,2) : those that are cut
     """
 
     spread: np.ndarray
@@ -113,6 +115,8 @@ class SeamSearch:
     rehearsed: dict[bytes, float | None] = field(default_factory=dict)
     copies: TurnedCopies = field(default_factory=TurnedCopies, init=False)
     borders: tuple[TurnedCopies, TurnedCopies] = field(default_factory=lambda: (TurnedCopies(), TurnedCopies()))
+    pockets: Callable[[], np.ndarray] = lambda: np.zeros((0, 2), np.int64)
+    pocketed: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     @property
     def is_again(self) -> bool:
@@ -121,8 +125,7 @@ class SeamSearch:
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
-        polygons = polygons[polygons >= 0]
-        return (self.further or not marked) and bool(np.isfinite(self.spread[polygons]).any())
+        return (self.further or not marked) and bool(np.isfinite(self.spread[polygons[polygons >= 0]]).any())
 
     def priced(self, component: CutComponent) -> CutComponent:
         """The component with the costs of where an artist would cut; what fills holes costs as before."""
@@ -158,9 +161,11 @@ class SeamSearch:
     def _searched(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Seams of a component that is no copy."""
         name, polygons = fingerprint(component), component.polygons[component.polygons >= 0]
-        share = 1.0 if self.share is None else float(self.share[polygons].min())
-        if self.share is not None and name in self.memory and not self.memory[name].is_copy:
-            self.memory[name] = yield from self._again(self.priced(component), self.memory[name], share)
+        share, known = 1.0 if self.share is None else float(self.share[polygons].min()), self.memory.get(name)
+        if self.as_drawn and known is not None:
+            return known.edges  # Nothing of it came apart along creases.
+        if self.share is not None and known is not None and not known.is_copy:
+            self.memory[name] = yield from self._again(self.priced(component), known, share)
             return self.memory[name].edges
         bound = float(self.spread[polygons].min())
         bounded = bool(component.on_boundary().any())
@@ -314,22 +319,19 @@ class SeamSearch:
         normal = None if plane is None else plane.normal
         # Where the coarse surface is the surface itself, the map that is to be made tells as much as a rehearsal.
         rehearse = self.rehearse if component.vertex_count > self.options.vertices else None
-        return Rehearsal(
-            component, normal, lambda coarse: self._log_density(component, coarse), rehearse, self.rehearsed
-        )
+        return Rehearsal(component, normal, partial(self._log_density, component), rehearse, self.rehearsed)
 
     def _added(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut and arcs added to it: where it was tried by a map, that shears less with any more of them."""
-        before = self._recalled(component, found, share)
-        return replace(before, cut=(yield from self._grown(before.task, before.cut)))
+        known = self._recalled(component, found, share)
+        return replace(known, cut=(yield from self._grown(known.task, known.cut)))
 
     def _grown_further(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown on from where it was, or anew on the same surface where that is better."""
         before, cuts = self._recalled(component, found, share), []
-        task = before.task
         for k, begin in enumerate((before.cut, None)):
-            grown = yield from part_of(self._grown(task, begin), k / 2, 0.5)
-            cuts.append(replace(before, cut=trimmed(task, rerouted(task, grown))))
+            grown = yield from part_of(self._grown(before.task, begin), k / 2, 0.5)
+            cuts.append(replace(before, cut=trimmed(before.task, rerouted(before.task, grown))))
         return best_of(cuts)
 
     def _recalled(self, component: CutComponent, found: Found, share: float) -> CoarseCut:
@@ -412,8 +414,7 @@ class SeamSearch:
 
     def _mirror(self, component: CutComponent) -> FineMirror | None:
         """The mirror image of the component in itself, if its vertices have one, and some are in the plane."""
-        plane = self.costs().plane
-        real = component.vertex_ids < len(self.surface.positions)
+        plane, real = self.costs().plane, component.vertex_ids < len(self.surface.positions)
         if plane is None or not self.options.symmetric:
             return None
         points, own = component.positions, self.surface.positions[component.vertex_ids[real]]
@@ -431,8 +432,8 @@ class SeamSearch:
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""
-        factor, costs = np.ones(component.vertex_count), self.costs()
-        real = component.vertex_ids < len(self.surface.positions)
+        costs, real = self.costs(), component.vertex_ids < len(self.surface.positions)
+        factor = np.ones(component.vertex_count)
         within = WITHIN if (component.polygons < 0).any() else BARRED
         barred = np.where(costs.within_face, within, np.where(costs.in_face, BARRED, 1.0))
         factor[real] = barred[component.vertex_ids[real]]

@@ -1,6 +1,7 @@
 """Costs of seams: low where an artist would cut, high on a face, the same on both sides, and neutral where told."""
 
 import functools
+import itertools
 from dataclasses import replace
 
 import meshes
@@ -135,3 +136,35 @@ def test_a_body_that_is_inside_out_costs_what_it_costs_otherwise():
         # Single pixels of what is hidden hang on rounding.
         np.testing.assert_allclose(inside.cost, out.cost, rtol=1e-3)
         assert np.ptp(out.reasons["underside"]) > 0.5 and np.array_equal(inside.in_face, out.in_face)
+
+
+def among_others(size=1.0, off=0.0):
+    """Costs of a long body with heads above and below it that look to x, at y = 0 or off that to both sides; where its
+    middle is nobody would take for a face. The vertices of each head, too."""
+    V, F = meshes.head(40)
+    ball, triangles = meshes.icosphere(3)
+    points, faces = [ball * [1, 3, 6]], [triangles]
+    for up, side in itertools.product((1, -1), (1, -1) if off else (1,)):
+        faces.append((F if side > 0 else F[:, ::-1]) + sum(map(len, points)))
+        points.append(size * V * [1, side, 1] + [0, off * side, 8 * up])
+    costs = seam_costs(triangle_surface(np.concatenate(points), np.concatenate(faces)))
+    assert costs.plane is not None and abs(costs.plane.normal[1]) > 0.99 and costs.facing.certainty < 0.7
+    ends = np.cumsum([len(one) for one in points])
+    return costs, [slice(*pair) for pair in itertools.pairwise(ends)]
+
+
+def test_heads_among_other_parts_have_their_faces_though_the_whole_has_none(monkeypatch):
+    _, alone = head_costs()
+    for faced, found in ((0.7, True), (2.0, False)):
+        monkeypatch.setattr(seam_costs_module, "FACED", faced)
+        costs, heads = among_others()
+        for head in heads:
+            assert bool(costs.face[head].max() > 0.9) == found
+            assert not found or np.corrcoef(costs.face[head], alone.face)[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("off, size, faced", [(0.0, 1.0, True), (4.0, 1.0, False), (0.0, 0.1, False)])
+def test_only_large_parts_across_the_plane_have_faces_of_their_own(off, size, faced):
+    """A head beside the plane is an arm or a foot, and a small one a button."""
+    costs, heads = among_others(size, off)
+    assert bool(costs.face[heads[0]].max() > 0.9) == faced

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import meshes
@@ -161,6 +161,21 @@ def test_what_came_apart_or_is_stuck_is_not_searched_again():
     memory = {k: SimpleNamespace(polygons=np.array([k]), is_stuck=k == 1) for k in range(4)}
     one = round_of([1] * 4, [1.5] * 4, memory=memory)
     assert one.to_be_searched({2: np.zeros((1, 2))}) == [0, 3]
+
+
+@dataclass(frozen=True)
+class FoundOnce:
+    """What a search has found of polygons (m,)."""
+
+    polygons: np.ndarray
+    is_stuck: bool = False
+
+
+def test_what_a_search_comes_to_again_and_hardly_got_on_with_is_not_asked_for_more():
+    one = round_of([1] * 3, [1.5] * 3, memory={k: FoundOnce(np.array([k])) for k in range(3)})
+    one.tell_stuck({0: FoundOnce(np.zeros(1)), 1: FoundOnce(np.zeros(1), True), 7: FoundOnce(np.zeros(1), True)})
+    assert one.to_be_searched({}) == [0, 2] and sorted(one.memory) == [0, 1, 2]
+    assert one.memory[1].polygons == [1]
 
 
 def test_shares_ask_for_what_is_left_and_for_what_was_promised_and_not_kept():

@@ -211,6 +211,18 @@ def test_what_shears_more_than_was_predicted_is_cut_though_nothing_was_before():
     assert len(cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.5))).cuts.edges)
 
 
+def test_what_does_not_come_apart_as_drawn_keeps_the_seams_it_had(monkeypatch):
+    V, F = meshes.cap(20, 40, 0.5)
+    surface = triangle_surface(V, F)
+    search = SeamSearch(np.full(len(F), 0.01), surface, lambda: seam_costs(surface))
+    edges = cut_to_disks(surface, search=search).cuts.edges
+    assert len(edges)
+    monkeypatch.setattr(SeamSearch, "_best", None)
+    assert np.array_equal(cut_to_disks(surface, search=replace(search, as_drawn=True)).cuts.edges, edges)
+    with pytest.raises(TypeError):
+        cut_to_disks(surface, search=replace(search, as_drawn=True, memory={}))
+
+
 def test_a_net_is_taken_first_and_searched_for_once_its_map_has_missed_the_bound(monkeypatch):
     surface = triangle_surface(*meshes.subdivide(*meshes.cube()))
     count, searched = len(surface.face_start) - 1, []
