@@ -1,4 +1,7 @@
-"""A preview of a result in one picture: the mesh with a checker or its cells, the layout, and the wireframe. Needs no display."""
+"""A preview of a result in one picture: the mesh with a checker or its cells, the layout, the wireframe.
+
+Needs no display.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ class _Drawn:
 
 
 def preview(objects: Sequence[Placed], tile: int = TILE) -> np.ndarray:
-    """A picture (h,w,3) in [0,1], top row first: checker or cells, layout, wireframe; without UVs clay and wireframe."""
+    """A picture (h,w,3) in [0,1], top row first: checker or cells, layout, wireframe; without UVs clay, no layout."""
     drawn = _drawn(objects)
     tiles = [_checkered(drawn, tile)]
     if drawn.uv is not None:

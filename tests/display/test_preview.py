@@ -122,7 +122,8 @@ def test_a_picture_is_read_back_from_its_bytes(package, tmp_path):
 def test_a_layout_is_drawn_where_every_object_has_uvs(package, monkeypatch):
     preview = package("display.preview")
     whole = [SimpleNamespace(space=np.ones((k, 3, 3)), normals=np.ones((k, 3, 3)), uv=np.full((k, 3, 2), float(k)),
-                             real=np.ones((k, 3), bool), octaves=np.zeros(k), cells=np.full(k, -1)) for k in (2, 3)]  # fmt: skip
+                             real=np.ones((k, 3), bool), octaves=np.zeros(k), cells=np.full(k, -1))
+             for k in (2, 3)]  # fmt: skip
     monkeypatch.setattr(preview, "_of_object", lambda item: item)
     found = preview._drawn(whole)
     assert found.uv[:, 0, 0].tolist() == [2, 2, 3, 3, 3] and len(found.space) == len(found.octaves) == 5
