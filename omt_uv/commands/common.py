@@ -8,6 +8,7 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from .. import __version__
@@ -159,15 +160,18 @@ def write_picture(path: Path, picture) -> None:
         raise CommandError(f"{path}: {error}") from error
 
 
-def write_preview(options: argparse.Namespace, pairs) -> None:
-    """Draw objects with their Readings into a PNG file, if there is to be one."""
+def write_preview(options: argparse.Namespace, pairs, cells=None) -> None:
+    """Draw objects with their Readings into a PNG file, if there is to be one; cells: (f,) of the polygons of each."""
     if options.preview is None:
         return
     from ..display.png import png_bytes
     from ..display.preview import preview
     from ..files.verified import write_bytes
 
-    write_bytes(options.preview, png_bytes(preview(place_objects(options, pairs))))
+    placed = place_objects(options, pairs)
+    if cells is not None:
+        placed = [replace(item, cells=mine) for item, mine in zip(placed, cells, strict=True)]
+    write_bytes(options.preview, png_bytes(preview(placed)))
 
 
 def place_objects(options: argparse.Namespace, pairs) -> list:

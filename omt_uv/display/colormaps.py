@@ -1,4 +1,4 @@
-"""Colour distortion: the area in octaves from blue over white to red, shear in viridis."""
+"""Colour distortion, the area in octaves from blue over white to red, shear in viridis; and cells by their numbers."""
 
 from __future__ import annotations
 
@@ -19,6 +19,11 @@ _SHEAR = (
     (68, 1, 84), (71, 44, 122), (59, 81, 139), (44, 113, 142), (33, 144, 141),
     (39, 173, 129), (92, 200, 99), (170, 220, 50), (253, 231, 37),
 )  # fmt: skip
+
+
+def cell_colours(cells: np.ndarray) -> np.ndarray:
+    """sRGB (m,3) in [0,1] of the numbers of cells (m,): hues a golden section apart, so that neighbours differ."""
+    return 0.84 + 0.12 * np.cos(2 * np.pi * ((cells * 0.618034) % 1)[:, None] + np.array([0.0, 2.1, 4.2]))
 
 
 def area_colours(octaves: np.ndarray) -> np.ndarray:

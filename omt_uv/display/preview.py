@@ -1,4 +1,7 @@
-"""A preview of a result in one picture: the mesh with a checker, the layout, and the wireframe. Needs no display."""
+"""A preview of a result in one picture: the mesh with a checker or its cells, the layout, the wireframe.
+
+Needs no display.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ import numpy as np
 from ..pipelines.distortion import triangles_of
 from ..pipelines.reading import Reading
 from ..solver.maps.distortion import face_distortion
-from .colormaps import area_colours
+from .colormaps import area_colours, cell_colours
 from .raster import Covered, cover, edge_distances
 
 # Pixels of a tile, twice those of a page of many, and how many samples a pixel has along either axis.
@@ -34,27 +37,32 @@ FOLDED = np.array([0.85, 0.0, 0.55])
 
 @dataclass(frozen=True)
 class Placed:
-    """A reading, and the rotation (3,3) and shift (3,) of its positions in the world, where Z is up."""
+    """A reading, and the rotation (3,3) and shift (3,) of its positions in the world, where Z is up.
+
+    cells (f,): numbers of what its polygons belong to, -1 for nothing, whose colours are shown in place of a checker
+    """
 
     reading: Reading
     rotation: np.ndarray
     shift: np.ndarray
+    cells: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class _Drawn:
     """Triangles of several objects: corners in space (m,3,3), normals (m,3,3), UVs (m,3,2) or None, which edges are
-    those of polygons (m,3), the one opposite corner i first, and octaves (m,)."""
+    those of polygons (m,3), the one opposite corner i first, octaves (m,), and cells (m,), -1 for none."""
 
     space: np.ndarray
     normals: np.ndarray
     uv: np.ndarray | None
     real: np.ndarray
     octaves: np.ndarray
+    cells: np.ndarray
 
 
 def preview(objects: Sequence[Placed], tile: int = TILE) -> np.ndarray:
-    """A picture (h,w,3) in [0,1], top row first: checker, layout and wireframe; without UVs clay and wireframe."""
+    """A picture (h,w,3) in [0,1], top row first: checker or cells, layout, wireframe; without UVs clay, no layout."""
     drawn = _drawn(objects)
     tiles = [_checkered(drawn, tile)]
     if drawn.uv is not None:
@@ -79,6 +87,7 @@ def _drawn(objects: Sequence[Placed]) -> _Drawn:
         uv=uv,
         real=np.concatenate([part.real for part in parts]),
         octaves=octaves,
+        cells=np.concatenate([part.cells for part in parts]),
     )
 
 
@@ -101,15 +110,18 @@ def _of_object(item: Placed) -> _Drawn:
     step = (b - a) % size[:, None]
     real = (step == 1) | (step == size[:, None] - 1)
     uv = None if reading.uv is None else reading.uv[corners].astype(float)
-    return _Drawn(space, normals[triangles], uv, real, np.zeros(len(corners)))
+    cells = np.full(len(corners), -1) if item.cells is None else item.cells[face]
+    return _Drawn(space, normals[triangles], uv, real, np.zeros(len(corners)), cells)
 
 
 def _checkered(drawn: _Drawn, tile: int) -> np.ndarray:
-    """The mesh with a checker on it, in clay without UVs."""
+    """The mesh in the colours of its cells, without any with a checker on it, in clay without UVs."""
     corners, depth, light = _seen(drawn, tile)
     found = cover(corners, depth, (tile * SAMPLES,) * 2)
     colour = np.broadcast_to(CLAY, (len(found.pixels), 3))
-    if drawn.uv is not None:
+    if (drawn.cells >= 0).any():
+        colour = np.where((drawn.cells >= 0)[:, None], cell_colours(drawn.cells), CLAY)[found.triangles]
+    elif drawn.uv is not None:
         colour = checker_colours((found.weights[:, :, None] * drawn.uv[found.triangles]).sum(1))
     return _picture(found, colour * _shade(found, light), tile)
 

@@ -32,7 +32,8 @@ class Gate:
         """What is to be said: nothing where there is neither fold nor overlap; `before` the run, if there were UVs."""
         told = []
         if self.folds:
-            same = before is not None and self.folds <= before.folds
+            # A new mesh has other faces: shares of them tell, not how many there are.
+            same = before is not None and self.folds * before.faces <= before.folds * self.faces
             count = plural(self.folds, "1 face is", "{} faces are")
             told.append(f"{count} folded in the UVs{', as before' if same else ''}")
         if self.overlap > OVERLAP:

@@ -233,7 +233,8 @@ def _globe(component: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -
     laying = _laid_out(points, polygons, shares, settings)
     uv, points, missed = yield from part_of(laying, MAPPING, 1 - MAPPING)
     areas = signed_areas(uv, polygons.triangles)
-    warnings = (*found.warnings, *_pole_warnings(missed, int(((areas <= 0) & (on_sphere > 0)).sum())))
+    folded = np.unique(component.faces[(areas <= 0) & (on_sphere > 0)])
+    warnings = (*found.warnings, *_pole_warnings(missed, len(folded)))
     return Globe(
         component=component,
         sphere=found,

@@ -232,7 +232,9 @@ def uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.nd
         return np.abs(signed_areas(full, region.surface.triangles[rows]))
     # Triangles of a polygon have the same weight.
     owner = region.surface.triangle_face
-    whole = polygon_uv_areas(region.surface, full, region.subdivision) / np.maximum(np.bincount(owner), 1)
+    whole = polygon_uv_areas(region.surface, full, region.subdivision)
+    # The last polygons may have no triangle.
+    whole = whole / np.maximum(np.bincount(owner, minlength=len(whole)), 1)
     return np.where(np.isin(region.surface.triangles[rows, 0], corners), whole[owner[rows]], 0.0)
 
 

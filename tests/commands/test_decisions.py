@@ -150,14 +150,17 @@ def test_garbage_is_not_looked_for_while_blender_comes_and_again_afterwards(pack
     assert state == [collects] and gc.isenabled()
 
 
-@pytest.mark.parametrize("wrap", [False, True])
-def test_a_picture_is_of_what_was_made_or_of_what_it_lies_on(package, monkeypatch, wrap):
+@pytest.mark.parametrize("write", ["mesh", "points", "materials", "seams"])
+def test_a_picture_is_of_what_was_made_or_of_what_it_lies_on_with_its_cells(package, monkeypatch, write):
     partition = package("commands.shapes.partition")
     shown = []
-    monkeypatch.setattr(partition, "write_preview", lambda _, pairs: shown.append([obj for obj, *_ in pairs]))
-    obj, points = scenes.bump(2, 2), scenes.add([(0, 0, 0)], [], "Points")
-    partition._show(None, [(obj, None)], [points, obj] if wrap else [points])
-    assert shown == [[obj]]
+    monkeypatch.setattr(
+        partition, "write_preview", lambda _, pairs, cells: shown.append(([obj for obj, *_ in pairs], cells))
+    )
+    obj, made = scenes.bump(2, 2), scenes.bump(3, 3)
+    found = [SimpleNamespace(cell="of polygons", mesh=SimpleNamespace(cell="of pieces"))]
+    partition._show(SimpleNamespace(write=write), [(obj, None)], [made], found)
+    assert shown == [([made], ["of pieces"]) if write == "mesh" else ([obj], ["of polygons"])]
 
 
 @pytest.mark.parametrize("start", [None, ("python", "x.py")])

@@ -142,6 +142,7 @@ def drawn_of(space, normals=None):
         None,
         np.ones((len(space), 3), bool),
         np.zeros(len(space)),
+        np.full(len(space), -1),
     )
 
 

@@ -57,9 +57,9 @@ def square(package):
     )
     uv = (positions[surface.corner_vertex][:, :2] / 2).astype(np.float32)
 
-    def draw(uv=uv, tile=64):
+    def draw(uv=uv, tile=64, cells=None):
         reading = readings.Reading(surface, np.ones(2, bool), uv, None)
-        return preview([placed(reading, np.eye(3), np.zeros(3))], tile)
+        return preview([placed(reading, np.eye(3), np.zeros(3), cells)], tile)
 
     draw.uv = uv
     return draw
@@ -82,6 +82,21 @@ def test_the_diagonal_of_a_quad_is_no_line(square):
     size = 256 * 0.88
     edge = layout[round(256 * 0.94 - size / 4), round(256 * 0.06 + size / 2)]
     assert middle.min() > edge.min() + 0.1
+
+
+def test_cells_are_shown_in_their_colours_with_uvs_and_without(square, package):
+    """What is flat has one brightness, and shows as many colours as there are cells; what is in none is clay."""
+
+    def colours(picture):
+        tile = picture[:, :64].reshape(-1, 3)
+        # Those of pixels at outlines are mixed with paper.
+        found, count = np.unique((tile / tile.max(axis=1, keepdims=True)).round(3), axis=0, return_counts=True)
+        return {tuple(c) for c, n in zip(found, count, strict=True) if n > 100}
+
+    one, two, part = (colours(square(cells=np.array(c))) for c in ([0, 0], [0, 1], [-1, 1]))
+    clay = package("display.preview").CLAY
+    assert len(one) == 2 and one < two and len(two) == 3 and colours(square(uv=None, cells=np.array([0, 1]))) == two
+    assert part - two == {tuple((clay / clay.max()).round(3))}
 
 
 def test_a_folded_face_is_in_a_colour_of_its_own(square, package):
@@ -107,7 +122,8 @@ def test_a_picture_is_read_back_from_its_bytes(package, tmp_path):
 def test_a_layout_is_drawn_where_every_object_has_uvs(package, monkeypatch):
     preview = package("display.preview")
     whole = [SimpleNamespace(space=np.ones((k, 3, 3)), normals=np.ones((k, 3, 3)), uv=np.full((k, 3, 2), float(k)),
-                             real=np.ones((k, 3), bool), octaves=np.zeros(k)) for k in (2, 3)]  # fmt: skip
+                             real=np.ones((k, 3), bool), octaves=np.zeros(k), cells=np.full(k, -1))
+             for k in (2, 3)]  # fmt: skip
     monkeypatch.setattr(preview, "_of_object", lambda item: item)
     found = preview._drawn(whole)
     assert found.uv[:, 0, 0].tolist() == [2, 2, 3, 3, 3] and len(found.space) == len(found.octaves) == 5

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from readings import reading, together
 
+from omt_uv.pipelines import globe as globes
 from omt_uv.pipelines.globe import GlobeJob, Markers, closed_components, globe_jobs, project
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.settings import GlobeSettings
@@ -144,3 +145,26 @@ def test_the_flow_reports_its_costs_and_moser_alone():
     report = globe.report()
     assert report["costs"] == sorted(report["costs"], reverse=True)
     assert report["moser"]["folds"] == 0 and report["drift"] < 0.05
+
+
+def test_a_polygon_that_is_folded_near_a_pole_is_counted_once(monkeypatch):
+    """However many triangles it has: what is told counts faces of the mesh."""
+    V, F = meshes.icosphere(1)
+    surface = triangle_surface(V, F)
+    faces = np.concatenate([[0, 0, 0], np.arange(1, len(F) - 2)])
+    told = []
+    monkeypatch.setattr(globes, "closed_components", one_component(faces))
+    monkeypatch.setattr(globes, "signed_areas", lambda uv, triangles: np.r_[-1, -1, 1, -1, np.ones(len(F) - 4)])
+    monkeypatch.setattr(globes, "_pole_warnings", lambda missed, folded: told.append(folded) or [])
+    drain(project([GlobeJob(surface)], LAMBERT))
+    assert told == [2]
+
+
+def one_component(faces):
+    """What gives the one component of a surface, its triangles of these polygons (m,)."""
+
+    def given(surface, chosen):
+        (found,) = closed_components(surface, chosen)
+        return [replace(found, faces=faces)]
+
+    return given

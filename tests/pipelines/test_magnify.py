@@ -1,11 +1,14 @@
 """Painted regions get their shares, over several different objects as well, and everything else stays."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 from polygons import cut
 from readings import reading
 
+from omt_uv.pipelines import magnify as magnify_pipeline
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.magnify import Magnified, Region, Shares, magnify, warped_picture, whole_factor
 from omt_uv.pipelines.regions.detail import box_of
@@ -175,3 +178,12 @@ def test_the_box_of_regions_is_that_of_their_faces_in_the_old_uvs():
     assert box_of([nothing]) is None and np.allclose(box_of([nothing, one]), box_of([one]))
     other = region(V, F, inside.astype(float), V[:, :2] + [4, 1], "face")
     assert np.allclose(box_of([one, other]), [(2.2, 1.3), (4.5, 2.6)], atol=1e-6)
+
+
+def test_polygons_at_the_end_without_triangles_hold_up_no_area(monkeypatch):
+    surface = SimpleNamespace(
+        corner_vertex=np.arange(9), triangles=np.arange(6).reshape(2, 3), triangle_face=np.zeros(2, np.int64)
+    )
+    monkeypatch.setattr(magnify_pipeline, "polygon_uv_areas", lambda surface, uv, subdivision: np.array([6.0, 0.0]))
+    region = SimpleNamespace(surface=surface, subdivision="some")
+    assert magnify_pipeline.uv_areas(region, (np.arange(2),), np.arange(6), np.zeros((6, 2))).tolist() == [3, 3]

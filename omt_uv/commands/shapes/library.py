@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
             try:
                 found[name] = signature_of_file(options, path)
             except (CommandError, FileError) as error:
-                warn_of(f"{name}: {error}")
+                _tell(options, name, str(error))
                 continue
             # What was done stays when the rest is stopped.
             index = index_of({name: (marks[name], found[name])}, index)
@@ -86,6 +86,14 @@ def run(options: argparse.Namespace) -> None:
     if write:
         write_bytes(options.output, index.bytes())
     print(f"{len(found)} new, {len(index)} in {options.output}")
+
+
+def _tell(options: argparse.Namespace, name: str, reason: str) -> None:
+    """Say why a file below the folder has no signature; a reason that begins with the file is told once."""
+    path = options.input / name
+    for itself in (f"{path}: ", f"{path.name}: "):
+        reason = reason.removeprefix(itself)
+    warn_of(f"{name}: {reason}")
 
 
 def _mark(path: Path, markers: tuple[str, str] | None) -> str:
@@ -115,7 +123,7 @@ def _by_batch(options: argparse.Namespace, due: set[str]) -> dict:
     rows = carried_out(options, plan, tasks_of(plan, options.input))
     for name, row in rows.items():
         if row["state"] != "done":
-            warn_of(f"{name}: {row['message']}")
+            _tell(options, name, row["message"])
     return {
         name: read_signature((plan.output / name).with_suffix(SUFFIX))
         for name, row in rows.items()

@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
         made = _write(options, pairs, found)
     told = [(k, text) for k, partition in enumerate(found) for text in partition.warnings]
     warnings = warn(objects, told, _save(options, made))
-    _show(options, pairs, made)
+    _show(options, pairs, made, found)
     for obj, partition in zip(objects, found, strict=True):
         figures = partition.figures
         print(f"{obj.name}: {figures['cells']} cells, largest error of an area {figures['error']:.1e}")
@@ -97,12 +97,14 @@ def _write(options: argparse.Namespace, pairs: list, found: list) -> list:
     return made
 
 
-def _show(options: argparse.Namespace, pairs: list, made: list) -> None:
-    """Draw what was made; of points, which have no faces, the meshes that they lie on."""
+def _show(options: argparse.Namespace, pairs: list, made: list, found: list) -> None:
+    """Draw what was made in the colours of its cells; of points, which have no faces, the meshes that they lie on."""
     from ...blender.mesh import read
 
-    faced = [obj for obj in made if obj.data.polygons]
-    write_preview(options, [(obj, read(obj)) for obj in faced] or pairs)
+    if options.write == "mesh":
+        write_preview(options, [(obj, read(obj)) for obj in made], [partition.mesh.cell for partition in found])
+    else:
+        write_preview(options, pairs, [partition.cell for partition in found])
 
 
 def _save(options: argparse.Namespace, made: list) -> list[str]:

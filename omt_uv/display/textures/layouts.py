@@ -9,7 +9,7 @@ import numpy as np
 from ...pipelines.distortion import triangles_of
 from ...pipelines.measuring.diagrams import Diagram
 from ...solver.maps.distortion import face_distortion
-from ..colormaps import area_colours, shear_colours
+from ..colormaps import area_colours, cell_colours, shear_colours
 from ..preview import Placed
 from ..raster import cover, edge_distances
 
@@ -56,8 +56,7 @@ def cells_picture(diagram: Diagram, size: int) -> np.ndarray:
     wide = size * SAMPLES
     corner = (seen * [1, -1] * ((0.5 - FREE) / extent) + 0.5) * wide
     found = cover(corner[triangles], depth[triangles], (wide, wide))
-    tint = 0.5 + 0.5 * np.cos(2 * np.pi * ((owner * 0.618034) % 1)[:, None] + np.array([0.0, 2.1, 4.2]))
-    colour = 0.72 + 0.24 * tint[found.triangles]
+    colour = cell_colours(owner)[found.triangles]
     # A side of a cell is a side of its fan that starts at no corner inside: opposite the first, and the two outermost.
     start, end = diagram.cells.start[:-1][owner], diagram.cells.start[1:][owner]
     real = np.stack([np.ones(len(owner), bool), triangles[:, 2] == end - 1, triangles[:, 1] == start + 1], axis=1)

@@ -418,9 +418,16 @@ def _sides(p: np.ndarray) -> np.ndarray:
     across, (m,3)."""
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     side = lengths(e1)
+    # Where its ends lie on one another the first side is as short as the third corner is low where that lies on it.
+    lost = side == 0
+    if lost.any():
+        far = lengths(e2[lost])
+        side[lost] = 1e-9 * np.where(far > 0, far, 1)
     x = np.einsum("md,md->m", e2, e1) / side
     y = lengths(cross3(e1, e2)) / side
     y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
+    if lost.any():
+        y[lost] = np.maximum(far, y[lost])
     return np.stack([side, x, y], axis=1)
 
 

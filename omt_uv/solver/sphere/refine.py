@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FoldedUVError
 from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import Elements, elements
-from ..maps.polygon_elements import polygon_elements, with_convex_quads_of
+from ..maps.polygon_elements import polygon_elements, polygon_mesh, with_convex_quads_of
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.spherical_geometry import normalized, signed_volumes
 from ..progress import Progress, Steps, part_of
@@ -30,6 +30,7 @@ from ..refinement.continuation_rules import (
     is_squeezed,
     planned_weights,
 )
+from ..refinement.elimination_order import has_several
 from ..refinement.hessian_blocks import Assembly, assembly_of, lone_triangles
 from ..refinement.mirrored_motion import find_symmetry
 from .newton import SphereProblem
@@ -106,7 +107,8 @@ def sphere_refine(
     if not 0 <= balance <= 1:
         raise ValueError(f"balance must lie in [0, 1], not {balance}")
     yield Progress("Refinement", 0.0)
-    problem, order = _renumbered(vertices, triangles, target)
+    # Its images give a triangle the other diagonal of a quad, too.
+    problem, order = _renumbered(vertices, triangles, target, polygons if mirror_polygons is None else mirror_polygons)
     start, steps = yield from untangle_on_sphere(problem.faces, problem.assembly, positions[order])
     folded = np.flatnonzero(~(signed_volumes(start, problem.faces.triangles) > 0))
     if len(folded):
@@ -155,9 +157,11 @@ def _equilateral(problem: SphereProblem) -> Elements:
     return replace(faces, triangles=problem.faces.triangles)
 
 
-def _renumbered(vertices, triangles, target) -> tuple[SphereProblem, np.ndarray]:
-    """The problem with vertices in the order (n,) in which they are eliminated."""
-    order = mesh_order(vertices, triangles)
+def _renumbered(vertices, triangles, target, polygons=None) -> tuple[SphereProblem, np.ndarray]:
+    """The problem with vertices in the order (n,) in which they are eliminated; polygons (m,): all corners of a quad
+    are neighbours, or what parts the mesh along diagonals would part nothing, and factors would fill."""
+    several = polygons is not None and has_several(polygons)
+    order = mesh_order(vertices, polygon_mesh(triangles, polygons).every_triangle() if several else triangles)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     triangles, target = place[triangles], target * (4 * np.pi / target.sum())

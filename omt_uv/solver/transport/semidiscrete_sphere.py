@@ -104,7 +104,10 @@ class SphereDual:
                 hull = by_hull(self.sites, site_weights)
             except TransportError:
                 return None
-        return spherical_cells(self.sites, site_weights, hull)
+        try:
+            return spherical_cells(self.sites, site_weights, hull)
+        except TransportError:
+            return None
 
     def confirmed(self, site_weights: np.ndarray, cells: SphericalCells) -> SphericalCells:
         """The same cells: flips that come to an end are proof, since a sphere has no boundary."""

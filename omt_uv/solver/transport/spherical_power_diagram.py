@@ -60,7 +60,10 @@ class SphericalCells:
 
 
 def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> SphericalCells:
-    """Cells of unit vectors (n,3) with weights (n,), whose convex hull is given."""
+    """Cells of unit vectors (n,3) with weights (n,), whose convex hull is given.
+
+    Raises TransportError where sites coincide: facets on both sides of an edge then have no normals.
+    """
     triangles = hull.triangles
     normal = facet_normals(sites, site_weights, triangles)
     tail, head = halfedges(triangles)
@@ -70,6 +73,9 @@ def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> 
     middle = normalized(_sum(tail, after, n))
     area = np.bincount(tail, triangle_areas(middle[tail], before, after), n)
     apart, along = lengths(after - before), lengths(after + before)
+    if not along.all():
+        lost = np.unique([tail[along == 0], head[along == 0]])
+        raise TransportError("The sites of the transport coincide", kind="vertex", elements=lost)
     arc = 2 * np.arctan2(apart, along)
     moment = _sum(tail, 0.5 * arc[:, None] * normalized(cross3(before, after - before)), n)
     once = np.arange(len(tail)) < hull.twin

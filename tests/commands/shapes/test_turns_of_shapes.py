@@ -207,6 +207,16 @@ def test_only_what_is_new_in_a_folder_gets_a_signature(
     assert capsys.readouterr().out.startswith(f"{len(new)} new, {len(known) + len(new)} in ")
 
 
+@pytest.mark.parametrize("begin", ["", "{path}: ", "{path.name}: "])
+def test_a_file_without_a_signature_is_named_once(library, tmp_path, monkeypatch, begin):
+    """Reasons begin with the file, with its name, or with neither."""
+    told = []
+    monkeypatch.setattr(library, "warn_of", told.append)
+    reason = begin.format(path=tmp_path / "in" / "a.obj") + "It is open"
+    library._tell(SimpleNamespace(input=tmp_path), "in/a.obj", reason)
+    assert told == ["in/a.obj: It is open"]
+
+
 def test_a_batch_of_signatures_is_asked_with_what_was_asked(library, package, tmp_path, monkeypatch):
     plans, told = [], []
 

@@ -21,6 +21,7 @@ from omt_uv.solver.mesh.geometry import (
     face_areas,
     face_normals,
     halfedge_lengths,
+    hat_gradients,
     in_parts,
     least_angles,
     lengths,
@@ -141,3 +142,16 @@ def test_bounds_are_those_of_every_axis(d):
     np.testing.assert_array_equal(low, points.min(axis=0))
     np.testing.assert_array_equal(high, points.max(axis=0))
     np.testing.assert_array_equal(extents(points), np.ptp(points, axis=0))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_a_triangle_with_two_corners_in_one_place_is_as_low_as_any_without_an_area(scale):
+    """Whichever two they are: nothing is divided by what lies between them; nor where all three are in one place."""
+    p = scale * np.array([[0.0, 0, 0], [0, 0, 0], [3, 4, 0]])
+    for turn in range(3):
+        area, hats = hat_gradients(p, np.roll(np.arange(3), turn)[None])
+        assert area[0] == pytest.approx(0.5e-9 * (5 * scale) ** 2, rel=1e-6)
+        assert np.isfinite(hats).all() and abs(hats.sum()) < 1e-6 * np.abs(hats).max()
+    area, hats = hat_gradients(0 * p, np.arange(3)[None])
+    assert area[0] > 0 and np.isfinite(hats).all()

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
-from sphere_shapes import blob, lopsided, random_rotation, random_sphere
+from sphere_shapes import blob, creature, lopsided, random_rotation, random_sphere
 
+from omt_uv.solver.linalg.sparse import Factor, minimum_degree
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from omt_uv.solver.progress import Progress, drain
-from omt_uv.solver.sphere import refine
+from omt_uv.solver.sphere import newton, refine
 from omt_uv.solver.sphere.multilevel import multilevel_start
 from omt_uv.solver.sphere.refine import _equilateral, _renumbered, relax, sphere_refine
 from omt_uv.solver.sphere.sphere_map import sphere_map
@@ -114,3 +115,22 @@ def test_equilateral_faces_have_the_areas_and_gradients_of_such():
     turn = faces.gradient[:, 1] / faces.gradient[:, 0]
     np.testing.assert_allclose(turn, np.exp(2j * np.pi / 3))
     np.testing.assert_array_equal(faces.triangles, problem.faces.triangles)
+
+
+def test_factors_of_quads_are_as_sparse_as_an_order_of_their_own_makes_them(monkeypatch):
+    """Ordered by triangles alone, what parts them along their diagonals parts no quads, and factors fill."""
+    V, F = creature(12, 2, 2, 3)
+    V = V - V.mean(0) + 0.1 * np.sin(V @ np.random.default_rng(1).normal(size=(3, 3)))
+    filled = []
+
+    def factor(matrix, order):
+        vertices = minimum_degree(matrix[::2, ::2])
+        found, least = Factor(matrix, order), Factor(matrix, (2 * vertices[:, None] + np.arange(2)).ravel())
+        filled.append(found.entries / least.entries)
+        return found
+
+    start, _ = drain(multilevel_start(V, F, face_areas(V, F)))
+    monkeypatch.setattr(newton, "Factor", factor)
+    polygons = np.tile(np.arange(len(F) // 2), 2)
+    drain(sphere_refine(V, F, start, face_areas(V, F), polygons=polygons, quality="draft"))
+    assert filled and max(filled) < 1.5

@@ -216,7 +216,7 @@ def test_bad_input_is_named():
         with pytest.raises(errors.TransportError) as caught:
             drain(transport(sites, mass, Disk()))
         assert caught.value.elements.tolist() == [9]
-    with pytest.raises(errors.TransportError, match="Sites coincide or lie outside the domain"):
+    with pytest.raises(errors.TransportError, match="Sites are too close together to tell apart, as at the ends of l"):
         drain(transport(np.vstack([sites, sites[3]]), np.ones(11), Disk()))
     line = np.column_stack([np.linspace(-0.5, 0.5, 6), np.zeros(6)])
     with pytest.raises(errors.TransportError, match="The sites of the transport lie on one line or"):

@@ -1,10 +1,13 @@
 """Power diagrams on the sphere: exact sums, and what they do not depend on."""
 
+import meshes
 import numpy as np
 import pytest
 
 from omt_uv.solver.errors import TransportError
-from omt_uv.solver.transport.spherical_power_diagram import by_flips, by_hull, spherical_cells
+from omt_uv.solver.mesh.topology import twins
+from omt_uv.solver.transport.semidiscrete_sphere import SphereDual
+from omt_uv.solver.transport.spherical_power_diagram import Hull, by_flips, by_hull, spherical_cells
 
 
 @pytest.fixture
@@ -62,3 +65,23 @@ def test_flips_and_hull_agree(sites, site_weights):
 def test_sites_on_half_of_the_sphere_have_no_cells(sites):
     with pytest.raises(TransportError, match="The sites of the transport leave half of the"):
         by_hull(np.abs(sites), np.zeros(90))
+
+
+@pytest.mark.filterwarnings("error")
+def test_sites_that_coincide_on_a_known_hull_are_named():
+    """Facets on both sides of their edge have no normals, and nothing can be divided by what lies between."""
+    points, triangles = meshes.icosphere(1)
+    one, other = sorted(triangles[5, :2])
+    points[other] = points[one]
+    hull = Hull(triangles, twins(triangles))
+    with pytest.raises(TransportError, match="The sites of the transport coincide") as caught:
+        spherical_cells(points, np.zeros(len(points)), hull)
+    assert caught.value.elements.tolist() == [one, other]
+
+
+def test_a_step_to_cells_that_are_none_is_not_taken(monkeypatch):
+    points, triangles = meshes.icosphere(1)
+    cells = spherical_cells(points, np.zeros(len(points)), Hull(triangles, twins(triangles)))
+    assert SphereDual(points).near(np.zeros(len(points)), cells) is not None
+    points[triangles[5, 1]] = points[triangles[5, 0]]
+    assert SphereDual(points).near(np.zeros(len(points)), cells) is None
