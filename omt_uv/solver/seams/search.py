@@ -32,8 +32,8 @@ from .predicted_scale import ScaleModel
 from .rehearsal import Rehearsal
 from .symmetric_base import symmetric_base
 
-# Share of the vertices that have an image in a component with a mirror plane.
-MIRRORED_SHARE = 0.97
+# Share of the vertices that have an image in a component with a mirror plane, and in a scan with one.
+MIRRORED_SHARE = (0.97, 0.9)
 # Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
 EXACT = 1e-4
 NEARLY = 0.03
@@ -426,9 +426,9 @@ class SeamSearch:
         distance, image = cKDTree(points).query(points - 2 * height[:, None] * plane.normal)
         in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
         mirror = FineMirror(image, height, in_plane, exact=True)
-        if np.mean(distance <= EXACT) >= MIRRORED_SHARE and in_plane.any():
+        if np.mean(distance <= EXACT) >= MIRRORED_SHARE[0] and in_plane.any():
             return mirror
-        return with_line(component, mirror) if np.mean(distance <= NEARLY) >= MIRRORED_SHARE else None
+        return with_line(component, mirror) if np.mean(distance <= NEARLY) >= MIRRORED_SHARE[1] else None
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""

@@ -96,6 +96,19 @@ def test_seams_of_a_scan_are_nearly_symmetric():
     assert len(seam) > 8 and far.max() < 0.5
 
 
+@pytest.mark.parametrize("width, mirrored", [(0.0, "exact"), (0.6, "near"), (1.0, None)])
+def test_an_ear_that_has_no_image_leaves_a_body_nearly_its_own_image(width, mirrored, monkeypatch):
+    """Up to a tenth of the vertices: what has a third of them on one side alone is another body."""
+    surface, found = egg([]), []
+    known = seam_costs(surface)
+    ear = np.linalg.norm(surface.positions - surface.positions[:, 0].max() * np.array([1, 0, 0]), axis=1) < width
+    surface.positions[ear] *= [1.5, 1, 1]
+    of = SeamSearch._mirror
+    monkeypatch.setattr(SeamSearch, "_mirror", lambda *given: found.append(of(*given)) or found[-1])
+    cut_to_disks(surface, search=SeamSearch(np.full(len(surface.face_start) - 1, 0.004), surface, lambda: known))
+    assert {None if one is None else "exact" if one.exact else "near" for one in found} == {mirrored}
+
+
 @pytest.mark.parametrize("loop", [3, 4, 5, 6])
 @pytest.mark.parametrize("tail", [0, 2])
 def test_paths_of_a_cut_have_every_edge_once_and_a_loop_is_two_of_them(loop, tail):
