@@ -79,8 +79,11 @@ def transport(
     cells = dual.anew(w)
     hidden = np.flatnonzero(cells.area <= 0)
     if len(hidden):
-        text = "Sites are too close together to tell apart, as at the ends of long limbs, or outside the domain"
-        raise TransportError(text, kind="vertex", elements=np.sort(order[hidden]))
+        raise TransportError(
+            "Sites are too close together to tell apart, as at the ends of long limbs, or outside the domain",
+            kind="vertex",
+            elements=np.sort(order[hidden]),
+        )
     found = yield from solve_dual(dual, w, cells, mass, tolerance)
     return Transport(
         site_weights=found.site_weights[np.argsort(order)],
