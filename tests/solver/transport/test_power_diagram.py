@@ -97,3 +97,12 @@ def test_sites_that_nearly_coincide_have_areas_or_are_told(seed):
     with np.errstate(all="raise"), contextlib.suppress(TransportError):
         cells = power_diagram(np.concatenate([apart, near]), np.zeros(100), Disk())
         assert np.isfinite(cells.area).all() and cells.area.sum() == pytest.approx(np.pi)
+
+
+def test_an_edge_from_a_site_to_itself_is_told():
+    """As rounding leaves it of two that nearly coincide."""
+    sites = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [-0.4, -0.3], [0.3, -0.4]])
+    known = by_hull(sites, np.zeros(5))
+    sites[1] = sites[0]
+    with pytest.raises(TransportError, match=r"^Sites coincide\."):
+        power_diagram(sites, np.zeros(5), Disk(), known)
