@@ -155,7 +155,7 @@ def test_a_picture_is_of_what_was_made_or_of_what_it_lies_on_with_its_cells(pack
     partition = package("commands.shapes.partition")
     shown = []
     monkeypatch.setattr(
-        partition, "write_preview", lambda _, pairs, cells: shown.append(([obj for obj, *_ in pairs], cells))
+        partition, "write_preview", lambda _, pairs, cells=None: shown.append(([obj for obj, *_ in pairs], cells))
     )
     obj, made = scenes.bump(2, 2), scenes.bump(3, 3)
     found = [SimpleNamespace(cell="of polygons", mesh=SimpleNamespace(cell="of pieces"))]

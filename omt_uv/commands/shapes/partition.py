@@ -98,11 +98,11 @@ def _write(options: argparse.Namespace, pairs: list, found: list) -> list:
 
 
 def _show(options: argparse.Namespace, pairs: list, made: list, found: list) -> None:
-    """Draw what was made in the colours of its cells; of points, which have no faces, the meshes that they lie on."""
+    """Draw the meshes that were made, as whoever measures the file does; else the cells on what they are of."""
     from ...blender.mesh import read
 
     if options.write == "mesh":
-        write_preview(options, [(obj, read(obj)) for obj in made], [partition.mesh.cell for partition in found])
+        write_preview(options, [(obj, read(obj)) for obj in made])
     else:
         write_preview(options, pairs, [partition.cell for partition in found])
 
