@@ -160,7 +160,7 @@ def test_a_picture_is_of_what_was_made_or_of_what_it_lies_on_with_its_cells(pack
     obj, made = scenes.bump(2, 2), scenes.bump(3, 3)
     found = [SimpleNamespace(cell="of polygons", mesh=SimpleNamespace(cell="of pieces"))]
     partition._show(SimpleNamespace(write=write), [(obj, None)], [made], found)
-    assert shown == [([made], ["of pieces"]) if write == "mesh" else ([obj], ["of polygons"])]
+    assert shown == [([made], None) if write == "mesh" else ([obj], ["of polygons"])]
 
 
 @pytest.mark.parametrize("start", [None, ("python", "x.py")])
