@@ -23,7 +23,7 @@ from .component import Copies, CutComponent, SideFinder, Topology, classify, mak
 from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
-from .gluing_facts import TurningLines, cost_factors, in_unit_box, marked_triangles, total_curvature, turning_lines
+from .gluing_facts import TurningLines, cost_factors, in_unit_box, to_search, total_curvature, turning_lines
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, around_pockets, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
@@ -308,15 +308,10 @@ class _Cutter:
 
     def _to_search(self, component_of: np.ndarray, corner_class: np.ndarray, members: list[np.ndarray]) -> np.ndarray:
         """Components (k,) bool whose seams are to be searched."""
-        searched = np.zeros(len(members), dtype=bool)
         if self.search is None:
-            return searched
+            return np.zeros(len(members), dtype=bool)
         curved = total_curvature(self.gluing, corner_class, component_of, self.positions) > CURVED
-        marked = np.zeros(len(members), dtype=bool)
-        marked[component_of[marked_triangles(self.surface, self.gluing)]] = True
-        for k in np.flatnonzero(curved):
-            searched[k] = self.search.wants(self.gluing.owner[members[k]], bool(marked[k]))
-        return searched
+        return to_search(self.surface, self.gluing, component_of, members, self.search, curved)
 
     def _best_cut(
         self, component: CutComponent, topology: Topology, k: int, filled: bool, searched: bool

@@ -11,7 +11,7 @@ from ..mesh.gluing import Gluing, components
 from ..mesh.surface import Surface, is_seam, is_sharp
 from ..mesh.topology import distinct, first_places, halfedges, pair_keys
 from ..quads.recombination import quad_diagonals
-from .component import SEAM, SHARP
+from .component import SEAM, SHARP, SideFinder
 
 # Edges that are marked are meant to be up to that share of all.
 MEANT = 0.5
@@ -110,3 +110,15 @@ def in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
     positions = np.zeros(surface.positions.shape)
     positions[used] = p / unit - low / unit
     return positions, unit
+
+
+def to_search(
+    surface: Surface, gluing: Gluing, component_of: np.ndarray, members: list, search: SideFinder, among: np.ndarray
+) -> np.ndarray:
+    """Components (k,) bool of those `among` (k,) bool whose seams are to be searched; component_of (m,) : of each
+    triangle, members : the triangles (l,) of each."""
+    found, marked = np.zeros(len(members), dtype=bool), np.zeros(len(members), dtype=bool)
+    marked[component_of[marked_triangles(surface, gluing)]] = True
+    for k in np.flatnonzero(among):
+        found[k] = search.wants(gluing.owner[members[k]], bool(marked[k]))
+    return found

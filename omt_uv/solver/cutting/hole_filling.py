@@ -19,7 +19,7 @@ from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .component import NOISE, SideFinder
-from .gluing_facts import in_unit_box, marked_triangles, total_curvature
+from .gluing_facts import in_unit_box, to_search, total_curvature
 
 NO_POLYGON = -1
 # Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a component is a sieve.
@@ -248,14 +248,13 @@ def around_pockets(
     before, and anew those of components that are searched; positions (n,3) in a unit box."""
     keys = pair_keys(*gluing.ends(gluing.first))
     before = np.isin(keys, pair_keys(*search.pocketed.T))
+    if not anew:
+        return before
     left = gluing.without(gone | before)
-    component_of, chosen = components(left), list[int]()
-    if anew:
-        curved = total_curvature(left, corner_classes(left), component_of, positions) > POCKETED
-        marked = np.isin(np.arange(len(curved)), component_of[marked_triangles(surface, left)])
-        members = groups(component_of)
-        chosen = [k for k in np.flatnonzero(curved) if search.wants(left.owner[members[k]], bool(marked[k]))]
-    if not chosen:
+    component_of = components(left)
+    curved = total_curvature(left, corner_classes(left), component_of, positions) > POCKETED
+    chosen = np.flatnonzero(to_search(surface, left, component_of, groups(component_of), search, curved))
+    if not len(chosen):
         return before
     around = np.isin(keys, pair_keys(*search.pockets().T))
     return before | (around & np.isin(component_of[gluing.first // 3], chosen))

@@ -13,7 +13,7 @@ from ..analysis.seam_costs import SeamCosts
 from ..linalg.minimum_cut import capacities
 from ..mesh.geometry import edge_lengths, face_areas
 from ..mesh.surface import Surface, chosen_triangles
-from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up
+from ..mesh.topology import graph_components
 from ..seams.parting import PolygonGraph, minimum_cut
 
 # A polygon is within a face by more than this, certainly not by less than the second, and certainly by more than the
@@ -43,7 +43,7 @@ def pocket_borders(surface: Surface, faces: np.ndarray | None, costs: SeamCosts)
     triangles = surface.corner_vertex[corners]
     if not costs.within_face[triangles].any():
         return np.zeros((0, 2), np.int64)
-    graph = _graph(surface.positions, triangles, owner)
+    graph = PolygonGraph.of_triangles(triangles, owner, face_areas(surface.positions, triangles))
     count = len(graph.area)
     within = np.bincount(graph.polygon, costs.within[triangles].mean(axis=1), count) / np.bincount(graph.polygon)
     component = graph_components(graph.joined[:, 0], graph.joined[:, 1], count)[1]
@@ -66,15 +66,3 @@ def pocket_borders(surface: Surface, faces: np.ndarray | None, costs: SeamCosts)
         if LEAST_POCKET <= area / total <= MOST_POCKET and length[around].sum() <= DEEP * np.sqrt(area):
             cut |= around
     return graph.ends[cut]
-
-
-def _graph(positions: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> PolygonGraph:
-    """The polygons that triangles (m,3) of vertices (n,3) are of, by their numbers (m,)."""
-    _, polygon = np.unique(owner, return_inverse=True)
-    polygon = polygon.ravel()
-    tail, head = halfedges(triangles)
-    one, other = pair_up(pair_keys(tail, head))
-    joined = polygon[np.stack([one, other], axis=1) // 3]
-    between = joined[:, 0] != joined[:, 1]
-    ends = np.stack([tail[one], head[one]], axis=1)
-    return PolygonGraph(polygon, np.bincount(polygon, face_areas(positions, triangles)), joined[between], ends[between])

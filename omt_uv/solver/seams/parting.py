@@ -75,14 +75,20 @@ class PolygonGraph:
     @staticmethod
     def of(chart: Chart, glued: bool = False) -> PolygonGraph:
         """The polygons of a chart; glued: joined across its seams, too, the ends being vertices of the surface."""
-        _, polygon = np.unique(chart.faces, return_inverse=True)
+        triangles = chart.vertex_ids[chart.triangles] if glued else chart.triangles
+        return PolygonGraph.of_triangles(triangles, chart.faces, face_areas(chart.vertices, chart.triangles))
+
+    @staticmethod
+    def of_triangles(triangles: np.ndarray, owner: np.ndarray, area: np.ndarray) -> PolygonGraph:
+        """The polygons that triangles (m,3) with areas (m,) are of, by their numbers (m,)."""
+        _, polygon = np.unique(owner, return_inverse=True)
         polygon = polygon.ravel()
-        tail, head = halfedges(chart.vertex_ids[chart.triangles] if glued else chart.triangles)
+        tail, head = halfedges(triangles)
         one, other = pair_up(pair_keys(tail, head))
         joined = polygon[np.stack([one, other], axis=1) // 3]
         between = joined[:, 0] != joined[:, 1]
-        area = np.bincount(polygon, face_areas(chart.vertices, chart.triangles))
-        return PolygonGraph(polygon, area, joined[between], np.stack([tail[one], head[one]], axis=1)[between])
+        ends = np.stack([tail[one], head[one]], axis=1)
+        return PolygonGraph(polygon, np.bincount(polygon, area), joined[between], ends[between])
 
     def pieces(self, kept: np.ndarray) -> np.ndarray:
         """The piece (p,) that each polygon is in, joined by the edges that are kept (e,) bool."""

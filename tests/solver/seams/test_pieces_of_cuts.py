@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from omt_uv.solver.cutting import cut_graph, cuts
+from omt_uv.solver.cutting import cut_graph, cuts, gluing_facts
 from omt_uv.solver.seams import cut_tree, fine_paths, parting, predicted_scale, symmetric_base
 
 
@@ -175,7 +175,7 @@ def test_seams_are_searched_where_a_component_is_curved_and_asked_for(wants, mon
     curvature = np.array([0.0, 1.001, 0.999]) * 0.2
     curvature[0] = 99.0
     monkeypatch.setattr(cuts, "total_curvature", lambda *_: curvature)
-    monkeypatch.setattr(cuts, "marked_triangles", lambda *_: np.array([False, True, False, False]))
+    monkeypatch.setattr(gluing_facts, "marked_triangles", lambda *_: np.array([False, True, False, False]))
     class_ = next(c for c in vars(cuts).values() if isinstance(c, type) and hasattr(c, "_to_search"))
     component_at, members = np.array([0, 1, 1, 2]), [np.array([0]), np.array([1, 2]), np.array([3])]
     found = class_._to_search(own, component_at, None, members)
