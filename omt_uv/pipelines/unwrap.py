@@ -86,7 +86,7 @@ def lay_out(
     elif staying:
         warnings.append((-1, _in_place(len(staying), len(free))))
     triangles = [_connected_triangles(island.chart) for island in free]
-    upright = _upright(free, jobs)
+    upright = _upright(free, jobs, maps)
     steps = pack_islands(upright, triangles, settings, around)
     packed = yield from part_of(steps, PACKING_FROM, 1 - PACKING_FROM)
     moved = [replace(i, uv=uv) for i, uv in zip(free, packed.islands, strict=True)]
@@ -96,10 +96,13 @@ def lay_out(
     return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
 
 
-def _upright(islands: Sequence[PlacedIsland], jobs: Sequence[UnwrapJob]) -> list[np.ndarray]:
+def _upright(
+    islands: Sequence[PlacedIsland], jobs: Sequence[UnwrapJob], maps: Sequence[SurfaceMap]
+) -> list[np.ndarray]:
     """UVs (n,2) of islands turned upright, but for those whose markers say how they lie."""
     turned = [k for k, island in enumerate(islands) if jobs[island.owner].markers is None]
-    charts, axes = [islands[k].chart for k in turned], [jobs[islands[k].owner].axes for k in turned]
+    charts, owners = [islands[k].chart for k in turned], [islands[k].owner for k in turned]
+    axes = [maps[owner].axes or jobs[owner].axes for owner in owners]
     ups, viewers = [scene.up for scene in axes], [scene.viewer for scene in axes]
     upright = turn_upright(charts, [islands[k].uv for k in turned], ups, viewers)
     found = dict(zip(turned, upright, strict=True))

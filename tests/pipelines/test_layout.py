@@ -112,6 +112,23 @@ def test_islands_stand_upright_in_the_layout():
         np.testing.assert_allclose(0.5 * (layout.uv[0].min(axis=0) + layout.uv[0].max(axis=0)), 0.5)
 
 
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_a_head_that_lies_has_the_layout_of_one_that_stands(up):
+    """On its back or on its face, as where a file's up is taken for another one."""
+    V, F = meshes.head(30)
+    surface = triangle_surface(V * [1, 1, 1.4], F)
+    lying, standing = (
+        drain(lay_out([UnwrapJob(surface, axes=axes)], Settings(max_shear=1.3)))
+        for axes in (
+            SceneAxes((up, 0.0, 0.0), (0.0, 0.0, -up)),
+            SceneAxes((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+        )
+    )
+    np.testing.assert_array_equal(lying.maps[0].seams, standing.maps[0].seams)
+    np.testing.assert_allclose(lying.uv[0], standing.uv[0], atol=2e-3)
+    assert lying.maps[0].axes.up == pytest.approx((0, 0, 1), abs=0.02)
+
+
 @pytest.mark.parametrize("tile, origin", [(1001, (0, 0)), (1002, (1, 0)), (1013, (2, 1))])
 def test_islands_that_stay_are_packed_around_in_their_own_tile(monkeypatch, tile, origin):
     """The packer works in the unit square: what stays is told it there, and what is packed goes to the tile."""

@@ -11,9 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import WeightError
-from ..mesh.geometry import unit, vertex_areas, vertex_normals
+from ..mesh.geometry import face_areas, unit, vertex_areas, vertex_normals
+from .occlusion import in_view
 from .symmetry_plane import SymmetryPlane
 from .vertex_scores import soft_weights
 
@@ -35,6 +37,18 @@ NECK = (0.5, 0.75)
 UNSURE = 0.5
 # A mirror plane whose normal rises more than this sine is no upright one: what was told to be up is not.
 LEANING = 0.3
+# A head is higher than deep. One that lies is lower than this share of its depth, its face is by this factor more
+# salient than what it shows to all sides, and on a face no body rests on a flat place with this share of its hull.
+LOW = 0.9
+MORE_SALIENT = 1.2
+RESTING = 0.05
+# A figure stands on two legs: nothing lies between them on its mirror plane, from one end on over a share of its length
+# between these, and it is more than twice as long as deep.
+LEGS = (0.15, 0.7)
+LONG = 0.5
+# How far what is flat may lean, and be off what is below, in radians.
+FLAT = np.pi / 18
+TILTED = np.pi / 5
 
 
 @dataclass(frozen=True)
@@ -90,8 +104,7 @@ def facing(
         up = viewer = np.zeros(3)
     near = area = vertex_areas(positions, triangles)
     if plane is not None:
-        depth = (positions - area @ positions / area.sum()) @ plane.normal
-        near = area * np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
+        near = area * _near(positions, area, plane)
     high = np.zeros(3)
     if up.any():
         # Feet and tails are salient, too.
@@ -108,6 +121,92 @@ def facing(
     certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1 if plane is not None else UNSURE))
     front = unit(off) if certainty else np.zeros(3)
     return Facing(front, up, certainty, float(np.clip((high @ front - BEAST[0]) / (BEAST[1] - BEAST[0]), 0, 1)))
+
+
+def standing(
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    saliency: np.ndarray,
+    plane: SymmetryPlane | None,
+    axes: SceneAxes | None,
+) -> SceneAxes | None:
+    """How a body of unit size (n,3), (m,3) with saliency (n,) stands: as was told, but for heads and figures with legs
+    that lie on their back or their face. Files do not say what is up; of two that most have one is taken for the other.
+    """
+    if plane is None or axes is None:
+        return axes
+    up, viewer = (unit(np.array(v, float) - (plane.normal @ v) * plane.normal) for v in (axes.up, axes.viewer))
+    if max(abs(plane.normal @ axes.up), abs(plane.normal @ axes.viewer)) > LEANING or abs(up @ viewer) > LEANING:
+        return axes
+    viewer = unit(viewer - (viewer @ up) * up)
+    # Set up, its head or its feet are where the viewer was.
+    backwards, forwards = SceneAxes(tuple(-viewer), tuple(up)), SceneAxes(tuple(viewer), tuple(-up))
+    used = positions[triangles].reshape(-1, 3)
+    lowness = np.ptp(used @ up) / np.ptp(used @ viewer)
+    if lowness > LOW:
+        return axes
+    if lowness < LONG and (legs := _legs(positions, triangles, plane, viewer)):
+        return backwards if legs > 0 else forwards
+    above, below, *around = _salient_views(positions, triangles, saliency, plane, np.array([up, -up, viewer, -viewer]))
+    if above > max(below, MORE_SALIENT * max(around)):
+        return backwards
+    if below > MORE_SALIENT * max(around) and _flat_share(used, -up, viewer) < RESTING:
+        return forwards
+    return axes
+
+
+def _legs(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray) -> int:
+    """Whether legs of a body are ahead (3,): 1; behind: -1; or whether it has none along there: 0."""
+    height, along = plane.distance(positions)[triangles], (positions @ ahead)[triangles]
+    across = (height.min(axis=1) <= 0) & (height.max(axis=1) >= 0)
+    if not across.any():
+        return 0
+    low, high = along.min(), along.max()
+    gaps = [(high - along[across].max()) / (high - low), (along[across].min() - low) / (high - low)]
+    least, most = sorted(gaps)
+    if not (LEGS[0] <= most <= LEGS[1] and least < LEGS[0]):
+        return 0
+    return 1 if gaps[0] > gaps[1] else -1
+
+
+def _salient_views(
+    positions: np.ndarray, triangles: np.ndarray, saliency: np.ndarray, plane: SymmetryPlane, directions: np.ndarray
+) -> list[float]:
+    """How salient (d,) what a body shows in the middle of its views from directions (d,3) within its mirror plane is:
+    a face, and no outline of a crown or a neck."""
+    area, areas = vertex_areas(positions, triangles), face_areas(positions, triangles)
+    eyes = (area_near := _near(positions, area, plane)) * salient_weights(saliency, area, SALIENT)
+    found = []
+    for direction, shown in zip(directions, in_view(positions, triangles, directions), strict=True):
+        across = (positions @ np.cross(direction, plane.normal))[triangles].mean(axis=1)
+        weight = areas * shown
+        if not weight.any():
+            found.append(0.0)
+            continue
+        off = across - weight @ across / weight.sum()
+        weight = weight * np.exp(-0.5 * off**2 * weight.sum() / max(weight @ off**2, np.finfo(float).tiny))
+        total = weight @ area_near[triangles].mean(axis=1)
+        found.append(float(weight @ eyes[triangles].mean(axis=1) / max(total, np.finfo(float).tiny)))
+    return found
+
+
+def _flat_share(points: np.ndarray, direction: np.ndarray, ahead: np.ndarray) -> float:
+    """The share of the area of the convex hull of points (k,3) that is flat and about across a direction (3,), to which
+    it may lean towards what is ahead (3,) or away from that."""
+    try:
+        hull = ConvexHull(points)
+    except QhullError:  # Flat as a whole.
+        return 1.0
+    area, normal = face_areas(hull.points, hull.simplices), hull.equations[:, :3]
+    lean = np.linspace(-TILTED, TILTED, 15)[:, None]
+    directions = np.cos(lean) * direction + np.sin(lean) * ahead
+    return float(((normal @ directions.T > np.cos(FLAT)).T @ area).max() / area.sum())
+
+
+def _near(positions: np.ndarray, area: np.ndarray, plane: SymmetryPlane) -> np.ndarray:
+    """How near vertices (n,3) with areas (n,) are to a plane through their middle, (n,) in [0, 1]."""
+    depth = (positions - area @ positions / area.sum()) @ plane.normal
+    return np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
 
 
 def with_a_face(positions: np.ndarray, triangles: np.ndarray, seen: Facing) -> np.ndarray:

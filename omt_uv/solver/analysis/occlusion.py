@@ -45,21 +45,12 @@ def hidden_sides(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
     positions (n,3), triangles (m,3): the front is where the corners run counterclockwise.
     """
-    points = unit_size(positions, triangles)
-    used = points[triangles]
-    centre = (used.min(axis=(0, 1)) + used.max(axis=(0, 1))) / 2
-    radius = float(np.linalg.norm(used - centre, axis=2).max())
-    # Pixels of the buffers are units, whose middle is their centre.
-    points = (points - centre) * ((PIXELS / 2 - 1) / radius)
-    owner, samples = spread_points(points, triangles, SPACING)
-    normal = face_normals(points, triangles).astype(np.float32)
-    samples = np.ascontiguousarray(samples.T, np.float32)
+    owner, samples, normal = _samples(positions, triangles)
     weight = np.zeros(len(triangles))
     # Of the front of every face, and of its back.
     seen = np.zeros((2, len(triangles)))
-    # The samples of a triangle come one after the other.
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
-    count, shares = np.diff(first, append=len(owner)), np.zeros((2, len(triangles)))
+    first, count = _first_samples(owner)
+    shares = np.zeros((2, len(triangles)))
     for frame in _frames(VIEWS):
         slant = normal @ frame[2]
         near, far = _visible(frame @ samples, slant, owner)
@@ -72,6 +63,23 @@ def hidden_sides(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         seen[1] += lit * np.where(towards, *shares[::-1])
     hidden = np.where(weight > 0, 1 - seen / np.maximum(weight, np.finfo(float).tiny), 0)
     return np.clip(hidden, 0, 1)
+
+
+def in_view(positions: np.ndarray, triangles: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """How much (d,m) of its area every triangle shows to whoever looks from these directions (d,3), unit vectors: the
+    share that nothing hides times the cosine of its slant; 0 where it shows its back.
+
+    positions (n,3), triangles (m,3)
+    """
+    owner, samples, normal = _samples(positions, triangles)
+    first, count = _first_samples(owner)
+    shown = np.zeros((len(directions), len(triangles)))
+    for share, frame in zip(shown, _frames_along(-directions), strict=True):
+        slant = normal @ frame[2]
+        near, _ = _visible(frame @ samples, slant, owner)
+        share[owner[first]] = np.add.reduceat(near, first, dtype=np.int64) / count
+        share *= np.maximum(-slant, 0)
+    return shown
 
 
 def looks_out(hidden: np.ndarray, area: np.ndarray, part: np.ndarray) -> np.ndarray:
@@ -107,10 +115,33 @@ def half_sphere(count: int) -> np.ndarray:
 
 def _frames(count: int) -> np.ndarray:
     """Orthonormal frames (count,3,3) whose third rows are spread over half of the sphere."""
-    axis = half_sphere(count)
+    return _frames_along(half_sphere(count))
+
+
+def _frames_along(axis: np.ndarray) -> np.ndarray:
+    """Orthonormal frames (d,3,3) whose third rows are unit vectors (d,3)."""
     across = cross3(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
     across /= np.linalg.norm(across, axis=1)[:, None]
     return np.stack([across, cross3(axis, across), axis], axis=1).astype(np.float32)
+
+
+def _samples(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Samples (3,s) of a surface (n,3), (m,3) about the origin, in pixels of the buffers, the triangles (s,) they are
+    on, one after the other, and the normals (m,3) of these."""
+    points = unit_size(positions, triangles)
+    used = points[triangles]
+    centre = (used.min(axis=(0, 1)) + used.max(axis=(0, 1))) / 2
+    radius = float(np.linalg.norm(used - centre, axis=2).max())
+    # Pixels of the buffers are units, whose middle is their centre.
+    points = (points - centre) * ((PIXELS / 2 - 1) / radius)
+    owner, samples = spread_points(points, triangles, SPACING)
+    return owner, np.ascontiguousarray(samples.T, np.float32), face_normals(points, triangles).astype(np.float32)
+
+
+def _first_samples(owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first sample (k,) of every triangle that has any, and how many (k,) it has; owner (s,) : see `_samples`."""
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    return first, np.diff(first, append=len(owner))
 
 
 def _visible(seen: np.ndarray, slant: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

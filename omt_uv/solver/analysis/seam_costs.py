@@ -16,7 +16,7 @@ from ..mesh.geometry import halfedge_lengths, unit, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, paired
-from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards, with_a_face
+from .facing import Facing, SceneAxes, ahead, facing, salient_weights, standing, towards, with_a_face
 from .feature_edges import fold_angles
 from .occlusion import hidden_sides, outside_out, vertex_occlusion
 from .order_of_places import order_of_places
@@ -98,6 +98,7 @@ class SeamCosts:
     face (n,) : in [0, 1], 1 on the front of a body that has one, and within it: seams should not end there
     within (n,) : in [0, 1], 1 in a mouth, a nostril or a socket, which no seam reaches but across the face
     plane : in which the surface is its own mirror image; facing : where it looks to
+    axes : how it stands, see `facing.standing`
     """
 
     edges: np.ndarray
@@ -108,6 +109,7 @@ class SeamCosts:
     within: np.ndarray
     plane: SymmetryPlane | None
     facing: Facing
+    axes: SceneAxes | None
 
     @property
     def in_face(self) -> np.ndarray:
@@ -153,7 +155,7 @@ def seam_costs(
     plane = symmetry_plane(positions, triangles, owner, side=left)
     if plane is not None and axes is not None and _is_chance(plane, axes):
         plane = None
-    seen, at_vertices = _vertex_reasons(positions, triangles, plane, axes)
+    seen, axes, at_vertices = _vertex_reasons(positions, triangles, plane, axes)
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)
         plane = _among_all(plane.carried(positions, space), used, len(surface.positions))
@@ -174,7 +176,7 @@ def seam_costs(
     vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
     face, within = np.zeros(n), np.zeros(n)
     face[used], within[used] = in_face, within_face
-    return SeamCosts(ends, cost, reasons, vertex_cost, face, within, plane, seen)
+    return SeamCosts(ends, cost, reasons, vertex_cost, face, within, plane, seen, axes)
 
 
 def _is_chance(plane: SymmetryPlane, axes: SceneAxes) -> bool:
@@ -201,14 +203,16 @@ def _among_all(plane: SymmetryPlane, used: np.ndarray, n: int) -> SymmetryPlane:
 
 def _vertex_reasons(
     positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane | None, axes: SceneAxes | None
-) -> tuple[Facing, dict[str, np.ndarray]]:
-    """Where a surface of unit size looks to, and what speaks for and against its vertices, (n,) each in [0, 1]."""
+) -> tuple[Facing, SceneAxes | None, dict[str, np.ndarray]]:
+    """Where a surface of unit size looks to, how it stands, and what speaks for and against its vertices, (n,) each in
+    [0, 1]."""
     n, area = len(positions), vertex_areas(positions, triangles)
     sides = hidden_sides(positions, triangles)
     # The front of a body that is inside out is its front all the same.
     triangles = outside_out(positions, triangles, sides)
     means = curvature_means(positions, triangles)
     saliency = saliency_of(means, triangles)
+    axes = standing(positions, triangles, saliency, plane, axes)
     seen = facing(positions, triangles, saliency, plane, axes)
     occlusion = vertex_occlusion(positions, triangles, sides)
     forwards, far_ahead, backwards = _looks(positions, triangles, seen)
@@ -234,7 +238,7 @@ def _vertex_reasons(
         "face": face,
         "within": face * (occlusion > BURIED[0]),
     }
-    return seen, reasons
+    return seen, axes, reasons
 
 
 def _looks(positions: np.ndarray, triangles: np.ndarray, seen: Facing) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..analysis.density import Target
 from ..analysis.order_of_places import lowest_first, order_of_places
+from ..analysis.symmetry_plane import MirrorImages
 from ..errors import MeshError, PinError
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart, triangle_rows
@@ -268,3 +269,17 @@ def _placed_like_given(w: np.ndarray, triangles: np.ndarray, given: np.ndarray) 
         return w / max(np.ptp(corners.real), np.ptp(corners.imag))
     scale = np.sqrt(then / now)
     return fit_similarity(scale * corners.ravel(), given.ravel(), rigid=True)(scale * w)
+
+
+def mirror_twins(charts: list[Chart], images: MirrorImages | None) -> np.ndarray:
+    """The number (k,) of the chart before each of which it is the mirror image, vertex by vertex; -1 for none."""
+    twin = np.full(len(charts), -1)
+    if images is None or not images.are_exact or len(charts) < 2:
+        return twin
+    sets = [np.unique(chart.vertex_ids) for chart in charts]
+    number = {vertices.tobytes(): k for k, vertices in enumerate(sets)}
+    for k, vertices in enumerate(sets):
+        other = number.get(np.sort(images.exact[vertices]).tobytes(), k)
+        if other < k and twin[other] < 0:
+            twin[k] = other
+    return twin

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.density import Target, means_of_polygons
+from ..analysis.facing import SceneAxes
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..analysis.straight_paths import closed_price
 from ..analysis.symmetry_plane import MirrorImages
@@ -23,7 +24,7 @@ from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_edges, boundary_loops, pair_keys
 from ..progress import Steps, part_of
-from .chart_indices import all_within, identity, is_marked, outline
+from .chart_indices import all_within, identity, is_marked, mirror_twins, outline
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
@@ -132,7 +133,7 @@ class ShearSearch:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
         what changes in the search; the edges that others were cut along (k,2) stay, and these are slit (s,2) as before.
         Of two charts that are each other's mirror image one is searched."""
-        target, twin = np.full(self.count, np.inf), self._twins(missed)
+        target, twin = np.full(self.count, np.inf), mirror_twins(missed, self.images)
         for k, chart in enumerate(missed):
             target[chart.faces] = spread[chart.faces] if twin[k] < 0 else np.inf
         search = replace(self.search(target), further=True, **changes)
@@ -157,25 +158,12 @@ class ShearSearch:
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept[~own]]))
         return disk_charts(surface, self.faces, search=replace(search, pocketed=kept[own]), **self.cutting)
 
-    def _twins(self, charts: list[Chart]) -> np.ndarray:
-        """The number (k,) of the chart before each of which it is the mirror image, vertex by vertex; -1 for none."""
-        twin = np.full(len(charts), -1)
-        if self.images is None or not self.images.are_exact or len(charts) < 2:
-            return twin
-        sets = [np.unique(chart.vertex_ids) for chart in charts]
-        number = {vertices.tobytes(): k for k, vertices in enumerate(sets)}
-        for k, vertices in enumerate(sets):
-            other = number.get(np.sort(self.images.exact[vertices]).tobytes(), k)
-            if other < k and twin[other] < 0:
-                twin[k] = other
-        return twin
-
     def with_images(self, charts: list[Chart], chosen: list[int]) -> list[int]:
         """The numbers of the chosen charts, with those of their mirror images: of two, the first is searched for both,
         and neither where that one is not chosen."""
         if not chosen:
             return []
-        twin = self._twins(charts)
+        twin = mirror_twins(charts, self.images)
         one = {k for k in chosen if twin[k] < 0}
         return [k for k in range(len(charts)) if k in one or int(twin[k]) in one]
 
@@ -228,6 +216,11 @@ class ShearSearch:
     @cached_property
     def _costs(self) -> SeamCosts:
         return seam_costs(self.surface, self.shear.preferences, self.faces)
+
+    @property
+    def axes(self) -> SceneAxes | None:
+        """How the surface stands in the scene; as was told where no seam was searched."""
+        return self._costs.axes if "_costs" in self.__dict__ else self.shear.preferences.axes
 
     @cached_property
     def _density(self) -> np.ndarray | None:

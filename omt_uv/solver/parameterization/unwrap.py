@@ -66,13 +66,15 @@ _Drawn = tuple[list[Chart], list[ChartMap]]
 class SurfaceMap:
     """All charts of a surface and their maps, in one texel density.
 
-    seams (k,2): edges that were cut for the map; warnings: what was repaired for the map.
+    seams (k,2): edges that were cut for the map; warnings: what was repaired for the map; axes: how the surface stands
+    in the scene, where that was found out.
     """
 
     charts: list[Chart]
     maps: list[ChartMap]
     seams: np.ndarray
     warnings: tuple[str, ...] = ()
+    axes: SceneAxes | None = None
 
     def corner_uv(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners of the surface (k,) that were mapped, each once, and their coordinates (k,2), charts unpacked."""
@@ -169,7 +171,7 @@ def unwrap(
     given, (charts, maps) = charts, (yield from task.finished(charts, maps, surface))
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)
-    return SurfaceMap(charts, maps, cuts, (*said, *missed))
+    return SurfaceMap(charts, maps, cuts, (*said, *missed), None if cut.search is None else cut.search.axes)
 
 
 def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:

@@ -203,7 +203,7 @@ def test_reasons_of_vertices_are_steps_between_their_bounds(monkeypatch):
     }
     for name, what in fixed.items():
         monkeypatch.setattr(seam_costs, name, what)
-    _, reasons = seam_costs._vertex_reasons(V, F, None, None)
+    *_, reasons = seam_costs._vertex_reasons(V, F, None, None)
     for v in range(n):
         front = smooth(0.9 * sure * forwards[v], 0.1, 0.6) * (1 - smooth(occlusion[v], 0.5, 0.9))
         hidden = smooth(occlusion[v], 0.05, 0.5) * (1 - front)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.facing import UNSURE, SceneAxes, facing, towards, with_a_face
+from omt_uv.solver.analysis.facing import UNSURE, SceneAxes, facing, standing, towards, with_a_face
 from omt_uv.solver.analysis.saliency import saliency, unit_size
-from omt_uv.solver.analysis.symmetry_plane import symmetry_plane
+from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane, symmetry_plane
 
 
 def looks_to(V, F, axes=None):
@@ -61,6 +61,96 @@ def test_a_beast_looks_where_its_head_is_held_up_and_its_chest_is_no_face(ahead)
     assert upright.beast == 0 and (with_a_face(*meshes.head(30), upright) == 1).all()
 
 
+def stands(V, F, axes):
+    return standing(unit_size(V, F), F, saliency(V, F), symmetry_plane(V, F), axes)
+
+
+# What a file with another up is read as: on its back, on its face, and both upside down.
+LYING = [(1, -1), (-1, 1), (1, 1), (-1, -1)]
+
+
+@pytest.mark.parametrize(("up", "viewer"), LYING)
+def test_a_head_that_lies_stands_as_if_it_were_set_up_seen_from_its_front(up, viewer):
+    V, F = meshes.head(30)
+    V = V * [1, 1, 1.4]
+    axes = SceneAxes(up=(up, 0.0, 0.0), viewer=(0.0, 0.0, viewer))
+    found = stands(V, F, axes)
+    np.testing.assert_allclose(found.viewer, [1, 0, 0], atol=0.02)
+    np.testing.assert_allclose(found.up, [0, 0, -viewer * up], atol=0.02)
+    np.testing.assert_allclose(looks_to(V, F, found).front, [1, 0, 0], atol=0.02)
+    # Size, place and order of the faces do not matter.
+    moved = stands(100 * V + [5, 3, -2], F[::-1], axes)
+    np.testing.assert_allclose([moved.up, moved.viewer], [found.up, found.viewer], atol=1e-3)
+
+
+def figure(legs=0.4):
+    """A figure of boxes on two legs of a length, Z up: vertices and triangles, mirrored in the plane y = 0."""
+    V, F = meshes.cube()
+    V = V - V.mean(axis=0)
+    places = [((0, 0, legs / 2 + 0.4), (0.2, 0.6, 0.8 - legs)), ((0, 0, 0.9), (0.2, 0.2, 0.2))]
+    places += [((0, side, legs / 2), (0.2, 0.2, legs)) for side in (-0.2, 0.2)]
+    return (
+        np.concatenate([V / np.ptp(V, axis=0) * size + place for place, size in places]),
+        np.concatenate([F + k * len(V) for k in range(len(places))]),
+    )
+
+
+@pytest.mark.parametrize(("up", "viewer"), LYING)
+def test_a_figure_that_lies_stands_on_its_legs(up, viewer):
+    V, F = figure()
+    plane = SymmetryPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, None)
+    found = standing(V, F, np.zeros(len(V)), plane, SceneAxes((up, 0.0, 0.0), (0.0, 0.0, viewer)))
+    np.testing.assert_allclose([found.up, found.viewer], [[0, 0, 1], [-up * viewer, 0, 0]], atol=1e-12)
+    # Short feet, as of a wagon, are none; nor is what has no body.
+    for length in (0.1, 0.75):
+        wagon = figure(length)
+        axes = SceneAxes((up, 0.0, 0.0), (0.0, 0.0, viewer))
+        assert standing(*wagon, np.zeros(len(wagon[0])), plane, axes) is axes
+
+
+def test_what_stands_or_cannot_be_told_is_believed():
+    V, F = meshes.head(30)
+    upright = SceneAxes(up=(0.0, 0.0, 1.0), viewer=(0.0, 1.0, 0.0))
+    for axes in (upright, SceneAxes((0.0, 0.0, -1.0), (1.0, 0.0, 0.0)), SceneAxes((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))):
+        assert stands(V * [1, 1, 1.4], F, axes) is axes
+    # As high as deep; round; without a mirror plane; long and low without a face above or below.
+    lying = SceneAxes(up=(1.0, 0.0, 0.0), viewer=(0.0, 0.0, 1.0))
+    assert stands(V * [1, 1, 0.9], F, lying) is lying
+    assert stands(*meshes.icosphere(3), lying) is lying
+    assert standing(unit_size(V, F), F, saliency(V, F), None, lying) is lying
+    assert stands(V, F, None) is None
+    B, G = meshes.icosphere(4)
+    assert stands(B * [0.4, 0.5, 1], G, lying) is lying
+
+
+def published(name):
+    if meshes.model_path(name) is None:
+        pytest.skip("no models")
+    return meshes.load_model(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "front"), [("max_planck", (0, 0, -1)), ("optcuts_face", (0, 0, 1)), ("face", (0, 0, 1))]
+)
+@pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
+def test_published_heads_that_lie_look_where_their_faces_are(name, front, up):
+    V, F = published(name)
+    axes = SceneAxes(up=up, viewer=(0.0, -up[2], 0.0))
+    found = stands(V, F, axes)
+    assert abs(found.up[1]) > 0.99 and looks_to(V, F, found).front @ front > 0.95
+    # Without that it is the crown, the neck, or nothing at all.
+    assert looks_to(V, F, axes).front @ front < 0.1
+
+
+@pytest.mark.parametrize(
+    "name", ["spot", "cow", "camel_b", "homer", "ogre", "armadillo", "lion", "face", "suzanne", "beetle"]
+)
+def test_published_models_that_stand_are_believed(name):
+    V, F = published(name)
+    axes = SceneAxes(up=(0.0, 1.0, 0.0), viewer=(0.0, 0.0, 1.0))
+    assert stands(V, F, axes) is axes
+
+
 def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():
     V, F = meshes.icosphere(3)
     direction = V[17]
@@ -75,7 +165,5 @@ def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():
     [("optcuts_face", (0, 0, 1)), ("max_planck", (0, 0, -1)), ("david", (-0.67, 0.73, 0)), ("lion", (-0.23, 0, -0.97))],
 )
 def test_published_heads_look_where_their_faces_are(name, front):
-    if meshes.model_path(name) is None:
-        pytest.skip("no models")
-    V, F = meshes.load_model(name)
+    V, F = published(name)
     assert looks_to(V, F).front @ front > np.cos(np.pi / 4)

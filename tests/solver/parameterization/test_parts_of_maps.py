@@ -236,14 +236,11 @@ def test_a_later_search_knows_what_was_rehearsed_before():
 def test_twins_are_found_by_the_images_of_all_vertices():
     image = np.array([3, 4, 5, 0, 1, 2, 6])
     charts = [SimpleNamespace(vertex_ids=np.array(x)) for x in ([2, 0, 1], [0, 1, 6], [5, 4, 3], [3, 4, 6], [6])]
-    search = search_of()
-    search.__dict__["images"] = SimpleNamespace(exact=image, are_exact=True)
-    assert search._twins(charts).tolist() == [-1, -1, 0, 1, -1]
-    assert search._twins(charts[:1]).tolist() == [-1]
-    search.__dict__["images"] = SimpleNamespace(exact=image, are_exact=False)
-    assert search._twins(charts).tolist() == [-1] * 5
-    search.__dict__["images"] = None
-    assert search._twins(charts).tolist() == [-1] * 5
+    exact = SimpleNamespace(exact=image, are_exact=True)
+    assert chart_indices.mirror_twins(charts, exact).tolist() == [-1, -1, 0, 1, -1]
+    assert chart_indices.mirror_twins(charts[:1], exact).tolist() == [-1]
+    assert chart_indices.mirror_twins(charts, SimpleNamespace(exact=image, are_exact=False)).tolist() == [-1] * 5
+    assert chart_indices.mirror_twins(charts, None).tolist() == [-1] * 5
 
 
 def test_only_one_of_two_twins_is_searched_and_both_are_cut(monkeypatch):
@@ -486,8 +483,9 @@ def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, 
     ],
 )
 def test_mirror_images_are_cut_anew_with_the_chart_that_is_searched(twin, chosen, found, monkeypatch):
-    monkeypatch.setattr(shear_search.ShearSearch, "_twins", lambda self, charts: np.array(twin))
+    monkeypatch.setattr(shear_search, "mirror_twins", lambda charts, images: np.array(twin))
     search = shear_search.ShearSearch(None, None, ShearBound(1.3), None, {})
+    search.__dict__["images"] = None
     assert search.with_images([None] * 3, chosen) == found
 
 
