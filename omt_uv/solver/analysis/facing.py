@@ -46,6 +46,8 @@ RESTING = 0.05
 # between these, and it is more than twice as long as deep.
 LEGS = (0.15, 0.7)
 LONG = 0.5
+# Certainty that it looks at who sees it in the front view, where what stands out does not tell otherwise.
+FIGURE = 0.8
 # How far what is flat may lean, and be off what is below, in radians.
 FLAT = np.pi / 18
 TILTED = np.pi / 5
@@ -119,8 +121,20 @@ def facing(
     if up.any():
         off -= (off @ up) * up
     certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1 if plane is not None else UNSURE))
+    if plane is not None and viewer.any() and _is_figure(positions, triangles, plane, up):
+        ahead_of_it = unit(np.cross(up, plane.normal))
+        ahead_of_it *= np.sign(ahead_of_it @ viewer)
+        if off @ ahead_of_it >= 0 and abs(ahead_of_it @ viewer) > 1 - LEANING:
+            certainty, off = max(certainty, FIGURE), ahead_of_it
     front = unit(off) if certainty else np.zeros(3)
     return Facing(front, up, certainty, float(np.clip((high @ front - BEAST[0]) / (BEAST[1] - BEAST[0]), 0, 1)))
+
+
+def _is_figure(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, up: np.ndarray) -> bool:
+    """Whether a body is long and stands on two legs."""
+    used = positions[triangles].reshape(-1, 3)
+    long = np.ptp(used @ np.cross(up, plane.normal)) < LONG * np.ptp(used @ up)
+    return bool(long) and _legs(positions, triangles, plane, -up) > 0
 
 
 def standing(
@@ -157,7 +171,9 @@ def standing(
 
 def _legs(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray) -> int:
     """Whether legs of a body are ahead (3,): 1; behind: -1; or whether it has none along there: 0."""
-    height, along = plane.distance(positions)[triangles], (positions @ ahead)[triangles]
+    area = vertex_areas(positions, triangles)
+    height = ((positions - area @ positions / area.sum()) @ plane.normal)[triangles]
+    along = (positions @ ahead)[triangles]
     across = (height.min(axis=1) <= 0) & (height.max(axis=1) >= 0)
     if not across.any():
         return 0

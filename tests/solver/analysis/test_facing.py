@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.facing import UNSURE, SceneAxes, facing, standing, towards, with_a_face
+from omt_uv.solver.analysis.facing import FIGURE, UNSURE, SceneAxes, _is_figure, facing, standing, towards, with_a_face
 from omt_uv.solver.analysis.saliency import saliency, unit_size
 from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane, symmetry_plane
 
@@ -106,6 +106,21 @@ def test_a_figure_that_lies_stands_on_its_legs(up, viewer):
         wagon = figure(length)
         axes = SceneAxes((up, 0.0, 0.0), (0.0, 0.0, viewer))
         assert standing(*wagon, np.zeros(len(wagon[0])), plane, axes) is axes
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_figure_looks_at_the_viewer_where_nothing_speaks_against_it(side):
+    plane = SymmetryPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, None)
+    axes = SceneAxes((0.0, 0.0, 1.0), (side, 0.0, 0.0))
+    V, F = figure()
+    seen = facing(V, F, np.zeros(len(V)), plane, axes)
+    assert seen.front @ axes.viewer > 0.99 and seen.certainty >= FIGURE
+    assert not _is_figure(*figure(0.1), plane, seen.up) and not _is_figure(V * [4, 1, 1], F, plane, seen.up)
+    # Seen from its side, or from behind when its face is very salient.
+    aside = facing(*figure(), np.zeros(len(figure()[0])), plane, SceneAxes((0.0, 0.0, 1.0), (0.0, side, 0.0)))
+    assert aside.certainty < FIGURE
+    face = np.where((V[:, 0] * side < 0) & (V[:, 2] > 0.7), 1.0, 0.0) * np.linspace(0.5, 1, len(V))
+    assert facing(V, F, face, plane, axes).front @ axes.viewer < -0.99
 
 
 def test_what_stands_or_cannot_be_told_is_believed():
