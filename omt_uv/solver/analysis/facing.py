@@ -46,7 +46,10 @@ RESTING = 0.05
 # between these, and it is more than twice as long as deep.
 LEGS = (0.15, 0.7)
 LONG = 0.5
-# Certainty that it looks at who sees it in the front view, where what stands out does not tell otherwise.
+# A beast stands on flat feet, or hooves, with a gap between that is shorter, and has none where it looks to.
+HOOVES = (0.1, 0.7)
+WHOLE = 0.05
+# Certainty that a figure looks at who sees it in the front view, where what stands out does not tell otherwise.
 FIGURE = 0.8
 # How far what is flat may lean, and be off what is below, in radians.
 FLAT = np.pi / 18
@@ -134,7 +137,7 @@ def _is_figure(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlan
     """Whether a body is long and stands on two legs."""
     used = positions[triangles].reshape(-1, 3)
     long = np.ptp(used @ np.cross(up, plane.normal)) < LONG * np.ptp(used @ up)
-    return bool(long) and _legs(positions, triangles, plane, -up) > 0
+    return bool(long) and _legs(positions, triangles, plane, -up, LEGS) > 0
 
 
 def standing(
@@ -144,45 +147,67 @@ def standing(
     plane: SymmetryPlane | None,
     axes: SceneAxes | None,
 ) -> SceneAxes | None:
-    """How a body of unit size (n,3), (m,3) with saliency (n,) stands: as was told, but for heads and figures with legs
-    that lie on their back or their face. Files do not say what is up; of two that most have one is taken for the other.
+    """How a body of unit size (n,3), (m,3) with saliency (n,) stands: as was told, but for heads that lie on their back
+    or their face, and for what has legs and does not stand on these. Files do not say what is up, and of two that most
+    have one is taken for the other.
     """
-    if plane is None or axes is None:
+    if plane is None or axes is None or abs(plane.normal @ axes.viewer) > LEANING:
         return axes
-    up, viewer = (unit(np.array(v, float) - (plane.normal @ v) * plane.normal) for v in (axes.up, axes.viewer))
-    if max(abs(plane.normal @ axes.up), abs(plane.normal @ axes.viewer)) > LEANING or abs(up @ viewer) > LEANING:
-        return axes
-    viewer = unit(viewer - (viewer @ up) * up)
+    viewer = unit(np.array(axes.viewer, float) - (plane.normal @ axes.viewer) * plane.normal)
+    on_its_side = abs(plane.normal @ axes.up) > LEANING
+    up = np.cross(viewer, plane.normal) if on_its_side else np.array(axes.up, float)
+    up = unit(up - (up @ plane.normal) * plane.normal - (up @ viewer) * viewer)
     # Set up, its head or its feet are where the viewer was.
-    backwards, forwards = SceneAxes(tuple(-viewer), tuple(up)), SceneAxes(tuple(viewer), tuple(-up))
+    legs = _stands_on(positions, triangles, plane, viewer, up)
+    if legs:
+        return SceneAxes(tuple(-legs * viewer), axes.up if on_its_side else tuple(legs * up))
     used = positions[triangles].reshape(-1, 3)
-    lowness = np.ptp(used @ up) / np.ptp(used @ viewer)
-    if lowness > LOW:
+    if on_its_side or np.ptp(used @ up) > LOW * np.ptp(used @ viewer):
         return axes
-    if lowness < LONG and (legs := _legs(positions, triangles, plane, viewer)):
-        return backwards if legs > 0 else forwards
     above, below, *around = _salient_views(positions, triangles, saliency, plane, np.array([up, -up, viewer, -viewer]))
     if above > max(below, MORE_SALIENT * max(around)):
-        return backwards
+        return SceneAxes(tuple(-viewer), tuple(up))
     if below > MORE_SALIENT * max(around) and _flat_share(used, -up, viewer) < RESTING:
-        return forwards
+        return SceneAxes(tuple(viewer), tuple(-up))
     return axes
 
 
-def _legs(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray) -> int:
-    """Whether legs of a body are ahead (3,): 1; behind: -1; or whether it has none along there: 0."""
+def _stands_on(
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray, up: np.ndarray
+) -> int:
+    """Whether what a body that lies would stand on, two legs or four, is ahead (3,): 1; behind: -1; or nowhere: 0."""
+    used = positions[triangles].reshape(-1, 3)
+    if np.ptp(used @ up) < LONG * np.ptp(used @ ahead):
+        return _legs(positions, triangles, plane, ahead, LEGS)
+    legs = _legs(positions, triangles, plane, ahead, HOOVES)
+    if not legs or max(_gaps(positions, triangles, plane, up)) >= WHOLE:
+        return 0
+    return legs if _flat_share(used, legs * ahead, up) >= RESTING else 0
+
+
+def _legs(
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray, gap: tuple[float, float]
+) -> int:
+    """Whether legs of a body, with a gap between them of such a share of its length, are ahead (3,): 1; behind: -1; or
+    whether it has none along there: 0."""
+    behind, before = _gaps(positions, triangles, plane, ahead)
+    least, most = sorted((behind, before))
+    if not (gap[0] <= most <= gap[1] and least < gap[0]):
+        return 0
+    return 1 if before > behind else -1
+
+
+def _gaps(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray) -> tuple[float, float]:
+    """Shares of the length of a body along a direction (3,) from its rear and front ends on with nothing on its mirror
+    plane."""
     area = vertex_areas(positions, triangles)
     height = ((positions - area @ positions / area.sum()) @ plane.normal)[triangles]
     along = (positions @ ahead)[triangles]
     across = (height.min(axis=1) <= 0) & (height.max(axis=1) >= 0)
-    if not across.any():
-        return 0
     low, high = along.min(), along.max()
-    gaps = [(high - along[across].max()) / (high - low), (along[across].min() - low) / (high - low)]
-    least, most = sorted(gaps)
-    if not (LEGS[0] <= most <= LEGS[1] and least < LEGS[0]):
-        return 0
-    return 1 if gaps[0] > gaps[1] else -1
+    if not across.any() or high <= low:
+        return 1.0, 1.0
+    return float((along[across].min() - low) / (high - low)), float((high - along[across].max()) / (high - low))
 
 
 def _salient_views(

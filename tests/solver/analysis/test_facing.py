@@ -157,6 +157,18 @@ def test_published_heads_that_lie_look_where_their_faces_are(name, front, up):
     assert looks_to(V, F, axes).front @ front < 0.1
 
 
+@pytest.mark.parametrize(("name", "front"), [("spot", 2), ("camel_b", 2), ("cow", 0), ("homer", 2), ("ogre", 2)])
+@pytest.mark.parametrize("of", ["head or rump", "side"])
+def test_published_models_that_lie_stand_on_their_legs(name, front, of):
+    """Seen from above, as where Z is up of a file that is read with Y up."""
+    V, F = published(name)
+    ahead, aside = np.eye(3)[front], np.eye(3)[2 - front]
+    found = stands(V, F, SceneAxes(up=tuple(aside if of == "side" else -ahead), viewer=(0.0, 1.0, 0.0)))
+    np.testing.assert_allclose(found.up, [0, 1, 0], atol=0.01)
+    upright = looks_to(V, F, SceneAxes(up=(0.0, 1.0, 0.0), viewer=tuple(ahead)))
+    assert looks_to(V, F, found).front @ upright.front > 0.99
+
+
 @pytest.mark.parametrize(
     "name", ["spot", "cow", "camel_b", "homer", "ogre", "armadillo", "lion", "face", "suzanne", "beetle"]
 )
