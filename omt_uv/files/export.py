@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -234,6 +235,7 @@ def _write_fbx(path: Path, objects: Objects, everything: bool) -> list[str]:
     else:
         _select_only(objects)
         options |= {"object_types": {"MESH"}}
+    _name_source()
     bpy.ops.export_scene.fbx(
         filepath=str(path),
         use_selection=not everything,
@@ -242,6 +244,17 @@ def _write_fbx(path: Path, objects: Objects, everything: bool) -> list[str]:
         **options,
     )
     return []
+
+
+def _name_source() -> None:
+    """Give what is open a name that can be written: the exporter puts that of the .blend into an .fbx as UTF-8, and
+    ends with an error where it is none."""
+    name = bpy.data.filepath
+    if name.encode(errors="replace").decode() == name:
+        return
+    with tempfile.TemporaryDirectory(prefix="omt_uv_") as folder:
+        # From here on it is of that name, and finds its images from there.
+        bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / "source.blend"), check_existing=False)
 
 
 _WRITERS: dict[str, Callable[[Path, Objects, bool], list[str]]] = {

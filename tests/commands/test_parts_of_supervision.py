@@ -232,3 +232,15 @@ def test_a_second_blender_gets_the_words_that_started_this_one(words, program, p
     monkeypatch.setattr("sys.argv", words)
     assert package("registration")._command(["unwrap"]) == (4 if program else 3)
     assert asked == [(["unwrap"], [bpy.app.binary_path, *words[1:]]) if program else ["unwrap"]]
+
+
+@pytest.mark.parametrize("memory", [None, "2"])
+def test_what_is_told_of_an_end_knows_whether_memory_was_limited(package, supervision, monkeypatch, memory):
+    """Without a limit a process that the system ends has not gone beyond it."""
+    cli, errands = package("cli"), []
+    monkeypatch.setattr(supervision, "supervise", lambda errand: errands.append(errand) or 0)
+    if memory and not supervision.MEMORY_IS_LIMITED:
+        pytest.skip("no limits here")
+    words = ["measure", "a.obj", *(["--memory", memory] if memory else [])]
+    assert cli.program(words, ["python", *words]) == 0
+    assert [(errand.about, errand.memory) for errand in errands] == [("a.obj", memory == "2")]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import bpy
+
 import mesh_bytes
 import numpy as np
 import pytest
@@ -106,3 +108,35 @@ def test_a_mesh_is_handed_on_as_blender_holds_it(saving):
     assert found.corner_vertex.tolist() == [loop.vertex_index for loop in obj.data.loops]
     assert found.face_start.tolist() == [*(p.loop_start for p in obj.data.polygons), len(obj.data.loops)]
     assert found.layer == obj.data.uv_layers.active_index and len(found.layers) == len(obj.data.uv_layers)
+
+
+@pytest.mark.parametrize("everything", [False, True])
+@pytest.mark.parametrize("name", ["plain", "ü", "b\udce9"])
+def test_a_blend_of_any_name_becomes_an_fbx_with_its_images(package, tmp_path, name, everything):
+    """Blender's exporter ended with an error of Python where the name of the .blend was not UTF-8."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj, image = patch(), bpy.data.images.new("wood", 4, 4)
+    image.filepath_raw, image.file_format = str(tmp_path / "wood.png"), "PNG"
+    image.save()
+    material = bpy.data.materials.new("Wood")
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Principled BSDF"].inputs[0])
+    obj.data.materials.append(material)
+    plain = tmp_path / "in.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(plain))
+    image.filepath = "//wood.png"
+    bpy.ops.wm.save_as_mainfile(filepath=str(plain))
+    plain.with_suffix(".blend1").unlink()
+    given = plain.rename(tmp_path / f"{name}.blend")
+    before = given.read_bytes()
+    bpy.ops.wm.open_mainfile(filepath=str(given))
+    out = tmp_path / "out.fbx"
+    package("files.export").export(out, ".fbx", [bpy.data.objects["Patch"]], everything)
+    assert given.read_bytes() == before and set(tmp_path.iterdir()) == {given, out, tmp_path / "wood.png"}
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    (again,) = package("files.meshes").load(out)
+    assert len(again.data.polygons) == 1 and again.data.materials[0].name == "Wood"
+    (found,) = (image for image in bpy.data.images if image.source == "FILE")
+    assert bpy.path.abspath(found.filepath).endswith("wood.png") and tuple(found.size) == (4, 4)

@@ -263,6 +263,8 @@ def test_weights(kind, mode):
         vertex.select = vertex.index == 40
     untouched = scenes.state(obj)
     bpy.ops.object.mode_set(mode=mode)
+    magnify = bpy.context.window_manager.operator_properties_last("uv.omt_magnify")
+    magnify.exact = True
     assert bpy.ops.object.omt_weights(kind=kind, weight_group="w") == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     weights = weights_of(obj, "w")
@@ -271,8 +273,10 @@ def test_weights(kind, mode):
     after = scenes.state(obj)
     assert {k: v for k, v in after.items() if k != "groups"} == {k: v for k, v in untouched.items() if k != "groups"}
     # Magnify then asks for how much denser it gets: an exact share of what covers half the surface shears too much.
-    assert not bpy.context.window_manager.operator_properties_last("uv.omt_magnify").exact
-    bpy.ops.object.omt_weights(kind=kind, weight_group="w", invert=True)
+    assert not magnify.exact
+    magnify.exact = True
+    bpy.ops.object.omt_weights(kind=kind, weight_group="w", invert=True, show=False)
+    assert not magnify.exact
     np.testing.assert_allclose(weights_of(obj, "w"), 1 - weights, atol=1e-6)
 
 

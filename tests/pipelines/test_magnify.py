@@ -187,3 +187,13 @@ def test_polygons_at_the_end_without_triangles_hold_up_no_area(monkeypatch):
     monkeypatch.setattr(magnify_pipeline, "polygon_uv_areas", lambda surface, uv, subdivision: np.array([6.0, 0.0]))
     region = SimpleNamespace(surface=surface, subdivision="some")
     assert magnify_pipeline.uv_areas(region, (np.arange(2),), np.arange(6), np.zeros((6, 2))).tolist() == [3, 3]
+
+
+def test_what_was_left_out_covers_nothing_on_a_subdivision_either(monkeypatch):
+    surface = SimpleNamespace(
+        corner_vertex=np.arange(9), triangles=np.arange(9).reshape(3, 3), triangle_face=np.array([0, 1, 1])
+    )
+    monkeypatch.setattr(magnify_pipeline, "polygon_uv_areas", lambda surface, uv, subdivision: np.array([6.0, 8.0]))
+    region, rows = SimpleNamespace(surface=surface, subdivision="some"), np.array([0, 2])
+    assert magnify_pipeline.uv_areas(region, (rows,), np.arange(9), np.zeros((9, 2))).tolist() == [6, 4]
+    assert magnify_pipeline.uv_areas(region, (rows,), np.arange(3, 9), np.zeros((6, 2))).tolist() == [0, 4]

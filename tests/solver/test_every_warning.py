@@ -49,6 +49,9 @@ NO_WARNINGS = {
     ("solver/errors.py", "apply one level"): "said by `test_every_warning` of the pipelines",
     ("solver/maps/distortion.py", "The area of the faces"): "an error",
     ("solver/mesh/charts.py", "surface of genus"): "an error",
+    ("solver/mesh/closed_surface.py", "Fill the holes, or take"): "a remedy",
+    ("solver/mesh/closed_surface.py", "Only bodies without handles"): "a remedy",
+    ("solver/mesh/closed_surface.py", "Only closed surfaces without handles"): "a remedy",
     ("solver/parameterization/chart_map.py", "Cut this part further"): "a remedy",
     ("solver/signatures/marked.py", "Mark one vertex"): "a remedy",
     ("solver/signatures/marked.py", "Nothing is farther"): "an error",
@@ -396,6 +399,17 @@ def too_close(patch):
         drain(initial_map.initial_map(task, log))
         text = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
         yield log.warnings, [f"{text}; started from a mean value map instead"] if nearest < 1e-7 else []
+
+
+@says("solver/canonical/named_maps.py", "The conformal map puts neighbours")
+def too_close_for_cells(patch):
+    one = disk(3, boundary="disk")
+    task = named_maps.NamedProblem(one.vertices, one.triangles, one.target, "disk")
+    for nearest in (1.01e-7, 0.98e-7, 3e-9):
+        patch.setattr(named_maps, "halfedge_lengths", lambda *_, nearest=nearest: np.array([1.0, nearest]))
+        text = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
+        told = [f"{text}; started from a mean value map instead"] if nearest < 1e-7 else []
+        yield list(drain(named_maps.polar_map(task)).warnings), told
 
 
 def refused(error):

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from ...settings import DOMAINS
-from ..common import CommandError, check_paths, drain_shown, refusals, require_blender, write_picture
+from ..common import CommandError, check_paths, drain_shown, refusals, require_blender, warn, write_picture
 from ..options import add_input, names, texture_size
 from ..selection import read_file
 
@@ -38,6 +38,7 @@ def run(options: argparse.Namespace) -> None:
     obj, reading = max(pairs, key=lambda pair: len(pair[1].surface.triangles))
     with refusals(name=obj.name):
         found = drain_shown(diagram(reading.surface, reading.faces, options.domain))
+    warn([obj], [(0, text) for text in found.warnings], [])
     if ending == ".png":
         from ...display.textures.layouts import cells_picture
 

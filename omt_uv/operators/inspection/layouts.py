@@ -8,7 +8,7 @@ from bpy.props import EnumProperty, IntProperty
 from ...session import run
 from ...session.language import counted
 from ...settings import DOMAINS
-from ..base import Complaint, QuickOperator, SolverOperator, blaming, complaints, read_objects
+from ..base import Complaint, QuickOperator, SolverOperator, blaming, complaints, read_objects, warn
 
 KINDS = (
     ("AREA", "Area", "Every face in the colour of its area: blue has too little of the texture, red too much"),
@@ -74,5 +74,6 @@ class OBJECT_OT_omt_diagram(SolverOperator, bpy.types.Operator):
         mesh = new_mesh(f"{obj.name}_cells", points.tolist(), [p.tolist() for p in polygons])
         new = bpy.data.objects.new(mesh.name, mesh)
         link_beside(new, obj)
+        warn(self, [obj], [(0, text) for text in found.warnings])
         self.said = (("Cells", str(len(polygons))), ("Area error", f"{100 * found.residual:.2g} %"))
         self.report({"INFO"}, f"{new.name}: {counted(len(polygons), 'Made {} cell', 'Made {} cells')}")

@@ -25,12 +25,13 @@ from ...solver.transport.spherical_power_diagram import Hull
 @dataclass(frozen=True)
 class Diagram:
     """Cells of the vertices of a surface: polygons, the areas (n,) asked for, as shares of the domain, the largest
-    relative error of one, and Newton steps."""
+    relative error of one, Newton steps, and what is to be told of the map that the vertices come from."""
 
     cells: CellPolygons
     shares: np.ndarray
     residual: float
     iterations: int
+    warnings: tuple[str, ...] = ()
 
     @property
     def points(self) -> np.ndarray:
@@ -72,9 +73,10 @@ def diagram(surface: Surface, faces: np.ndarray | None, domain: str) -> Steps[Di
     assert cells is not None and sites is not None
     width, height = np.ptp(found.uv, axis=0)
     shape = Disk() if corners is None else Rectangle(float(width), float(height))
+    told = tuple(dict.fromkeys((*charts.warnings, *found.warnings)))
     polygons = planar_cells(sites, cells.site_weights, shape)
     mass = vertex_areas(vertices, chart.disk)
-    return Diagram(polygons, mass / mass.sum(), cells.residual, cells.iterations)
+    return Diagram(polygons, mass / mass.sum(), cells.residual, cells.iterations, told)
 
 
 def _of_sphere(surface: Surface, faces: np.ndarray | None) -> Steps[Diagram]:
@@ -86,4 +88,4 @@ def _of_sphere(surface: Surface, faces: np.ndarray | None) -> Steps[Diagram]:
     hull = Hull(found.triangles, twins(found.triangles))
     moved = yield from part_of(sphere_transport(found.sites, mass, hull=hull), 0.4, 0.6)
     polygons = spherical_cell_polygons(found.sites, moved.site_weights, moved.cells.hull)
-    return Diagram(polygons, mass / mass.sum(), moved.residual, moved.iterations)
+    return Diagram(polygons, mass / mass.sum(), moved.residual, moved.iterations, closed.warnings)

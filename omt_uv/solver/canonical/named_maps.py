@@ -15,19 +15,26 @@ import numpy as np
 from ..conformal.boundary_first import boundary_first
 from ..conformal.disk_map import ConformalMap, conformal_disk, conformal_rectangle
 from ..errors import BoundaryError, plural
+from ..maps.energy import elements
 from ..maps.untangle import count_folds, untangle
+from ..mesh.geometry import halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import Steps, part_of
 from ..transport.convex_domain import Disk, Domain, Rectangle
 from ..transport.inverse_map import centroid_map
 from ..transport.power_diagram import power_diagram
 from ..transport.semidiscrete import Transport, transport
+from .embeddings import evened_sites
 from .markers import ChartMarkers
 
 CONFORMAL = (0.0, 0.4)
 TRANSPORT = (0.4, 0.6)
 # A conformal image is brought this far into a rectangle, whose sides hold no sites.
 INSIDE = 1 - 1e-9
+# Sites closer than this are one in a power diagram, where their distance counts squared.
+RESOLUTION = 1e-7
+# What comes in its place is evened for areas with this weight, or the ends of limbs are no farther apart.
+EVENED = 30.0
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,8 @@ def polar_map(disk: NamedProblem, balance: float = 0.0) -> Steps[NamedMap]:
     """The map of algorithm 6: the transport from the conformal map with balance 0, the conformal map with 1.
 
     In between the site weights are 1 - balance times the transport's. Every vertex goes to the centroid of its cell.
+    Where the conformal map puts vertices too close together for a power diagram, a mean value map of evened weights
+    takes its place, and a warning says so.
 
     Raises
     ------
@@ -116,12 +125,20 @@ def polar_map(disk: NamedProblem, balance: float = 0.0) -> Steps[NamedMap]:
         raise BoundaryError("A polar factorisation needs a convex domain")
     found = yield from part_of(conformal_map(disk), *CONFORMAL)
     domain, sites = _in_domain(disk, found)
+    nearest, warnings = halfedge_lengths(sites, disk.triangles).min(), list(found.warnings)
+    if nearest < RESOLUTION:
+        faces = elements(disk.vertices, disk.triangles, disk.target)
+        evened = evened_sites(faces, disk.vertices, (disk.loop, disk.corners, domain), EVENED, np.inf)
+        sites = sites if evened is None else evened
+        warnings.append(
+            f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport; started from a mean "
+            "value map instead"
+        )
     mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
     cells = yield from part_of(transport(sites, mass, domain), *TRANSPORT)
     centroid = cells.cells.centroid
     if balance > 0:
         centroid = power_diagram(sites, (1 - balance) * cells.site_weights, domain).centroid
-    warnings: list[str] = list(found.warnings)
     uv = centroid_map(centroid, domain, disk.loop, disk.corners, warnings)
     folds = count_folds(uv, disk.triangles)
     if folds:

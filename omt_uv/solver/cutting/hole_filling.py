@@ -28,7 +28,7 @@ MANY = 32
 # than the second figure; its holes are small with no more than the third share of it.
 LEVEL = 0.95
 FLAT = 1e-3
-SMALL = 0.01
+SMALL = 0.04
 # Boundaries of a sieve that are so many times as long as most are no holes, but outer boundaries; at most MANY.
 OUTSTANDING = 3.0
 # Holes in a face are eyes, nostrils and throats, if they are no longer around than the first share of the root of the
@@ -213,7 +213,7 @@ def _holes(
         if whole is not None and whole.any():
             size = np.bincount(component_at, face_areas(positions, gluing.vertex[gluing.triangles]))
             # A disk inside such a loop is no more than that.
-            small = around**2 <= 4 * np.pi * SMALL * size[component_of]
+            small = (2 * around) ** 2 <= 4 * np.pi * SMALL * size[component_of]
             hole |= inner & small & whole[first_of // 3]
     return hole
 

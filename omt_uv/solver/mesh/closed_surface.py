@@ -25,6 +25,11 @@ from .geometry import bounding_box
 from .repair import faces_without_area, perturbed
 from .topology import graph_components, halfedges, next_halfedge, pair_keys, paired
 
+CUT_OPEN = "Only closed surfaces without handles map to a sphere; unwrap it with cuts"
+# What is inside of a body is in no chart of its surface.
+SOLID = "Only bodies without handles map to a ball; fill the tunnels through it"
+FILL_BODY = "Fill the holes, or take the library tetwild, which does"
+
 
 @dataclass(frozen=True)
 class ClosedSurface:
@@ -36,10 +41,13 @@ class ClosedSurface:
     warnings: tuple[str, ...]
 
 
-def closed_surface(vertices: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None = None) -> ClosedSurface:
+def closed_surface(
+    vertices: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None = None, body: bool = False
+) -> ClosedSurface:
     """Check that a mesh (n,3), (m,3) is one topological sphere, and repair triangles without area.
 
     polygons (m,): polygon of every triangle, of which those that have no area are warned of; by default each is its own
+    body : the surface is asked for what it encloses, which no chart has
 
     Raises
     ------
@@ -54,9 +62,9 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray, polygons: np.nda
     if len(wrong):
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
     _check_faces(triangles)
-    _check_edges(triangles)
+    _check_edges(triangles, body)
     _check_components(triangles, len(vertices))
-    _check_genus(triangles)
+    _check_genus(triangles, body)
     middle, extent = bounding_box(vertices)
     extent = extent or 1.0
     given = (vertices - middle) / extent
@@ -81,7 +89,7 @@ def _check_faces(triangles: np.ndarray) -> None:
         raise DuplicateFaceError("Several faces have the same vertices", kind="face", elements=double)
 
 
-def _check_edges(triangles: np.ndarray) -> None:
+def _check_edges(triangles: np.ndarray, body: bool) -> None:
     """Raise unless every edge has two faces that agree about which side is out."""
     tail, head = halfedges(triangles)
     edges, inverse, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
@@ -93,7 +101,7 @@ def _check_edges(triangles: np.ndarray) -> None:
         raise OrientationError("Neighbouring faces have opposite orientation", kind="edge", elements=ends[unlike])
     if (count < 2).any():
         raise OpenSurfaceError(
-            "The surface is not closed: it has boundary edges", kind="edge", elements=ends[count < 2]
+            "The surface is not closed: it has boundary edges", FILL_BODY if body else "", "edge", ends[count < 2]
         )
 
 
@@ -124,13 +132,11 @@ def _check_components(triangles: np.ndarray, n: int) -> None:
         raise PinchedVertexError("Several fans of faces meet in one vertex", kind="vertex", elements=torn)
 
 
-def _check_genus(triangles: np.ndarray) -> None:
+def _check_genus(triangles: np.ndarray, body: bool) -> None:
     """Raise unless the closed surface has no handles, by Euler's formula."""
     n, m = int(triangles.max()) + 1, len(triangles)
     # Every edge has two faces: V - E + F = n - m / 2 = 2 - 2 genus.
     genus = (2 - (n - m // 2)) // 2
     if genus > 0:
         handles = plural(genus, "a handle", "{} handles")
-        raise NotASphereError(
-            f"The surface has {handles}", "Only closed surfaces without handles map to a sphere; unwrap it with cuts"
-        )
+        raise NotASphereError(f"The surface has {handles}", SOLID if body else CUT_OPEN)

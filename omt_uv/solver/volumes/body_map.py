@@ -88,7 +88,7 @@ def volume_map(
     if domain not in DOMAINS or method not in METHODS:
         raise ValueError(f"domain must be one of {', '.join(DOMAINS)}, method one of {', '.join(METHODS)}")
     vertices, triangles = np.asarray(vertices, float), np.asarray(triangles, np.int64)
-    surface = closed_surface(vertices, triangles)
+    surface = closed_surface(vertices, triangles, body=True)
     outwards = _outwards(surface.vertices, triangles)
     yield Progress("Tetrahedra", 0.0)
     given = mesh is not None and held

@@ -10,7 +10,8 @@ from .shells import level_surface
 from .tet_mesh import tet_volumes
 from .transfer import TetLocation
 
-# Shares of volumes below this are taken for it: logarithms of inverted tetrahedra would be none.
+# Shares of volumes in a map below this, over the mean, are taken for it, and those in a body that are not positive:
+# flat and inverted tetrahedra have no logarithm.
 LEAST = 1e-3
 
 
@@ -25,8 +26,9 @@ class Slice:
 
 def dilation(points: np.ndarray, positions: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Binary logarithm (m,) of the ratio of shares, there over here, of tetrahedra (m,4): 0 where a volume is right."""
-    here, there = tet_volumes(points, tets), tet_volumes(positions, tets)
-    return np.log2(np.maximum(there / there.sum(), LEAST / len(tets)) / (here / here.sum()))
+    here, there = (x / x.sum() for x in (tet_volumes(points, tets), tet_volumes(positions, tets)))
+    least = LEAST / len(tets)
+    return np.log2(np.maximum(there, least) / np.where(here > 0, here, least))
 
 
 def plane_slice(

@@ -59,3 +59,16 @@ def test_cells_as_text_count_their_vertices_from_one(package):
     text = package("commands.pictures.diagram").obj_text(vertices, [np.array([0, 1, 2]), np.array([0, 2, 3])])
     lines = text.splitlines()
     assert lines[4:] == ["f 1 2 3", "f 1 3 4"] and lines[2] == "v 1 1 0.123456789" and text.endswith("4\n")
+
+
+def test_what_is_told_of_the_map_of_a_diagram_is_told_of_the_diagram(package, run, tmp_path, monkeypatch):
+    scenes.bump()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    named = package("solver.canonical.named_maps")
+    assert run("diagram", tmp_path / "in.blend", "-o", tmp_path / "d.obj")[2] == ""
+    monkeypatch.setattr(named, "halfedge_lengths", lambda *_: np.array([3e-9]))
+    status, _, err = run("diagram", tmp_path / "in.blend", "-o", tmp_path / "d.obj")
+    assert status == 0 and "warning: Bump: The conformal map puts neighbours 3e-09 apart" in err
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "in.blend"))
+    assert bpy.ops.object.omt_diagram() == {"FINISHED"}
+    assert any("3e-09 apart" in notice.text for notice in package("session.last_run").state.notices)

@@ -170,9 +170,12 @@ def test_what_others_read_is_not_overwritten():
     np.testing.assert_array_equal(read(change.result(), 0), table[:, :3])
 
 
-@pytest.mark.parametrize(("most", "code", "given"), [(65534, 5123, None), (65536, 5123, 5125), (9, 5125, 5125)])
+@pytest.mark.parametrize(
+    ("most", "code", "given"), [(65534, 5123, None), (65535, 5123, 5125), (65536, 5123, 5125), (9, 5125, 5125)]
+)
 def test_numbers_of_vertices_are_as_wide_as_the_largest_takes(most, code, given):
-    """Of all primitives together; what was wide stays so, and what keeps its vertices is not written."""
+    """Of all primitives together; what was wide stays so, and what keeps its vertices is not written. The largest
+    number of two bytes begins a primitive anew, and is no vertex."""
     written = {}
 
     class Change:

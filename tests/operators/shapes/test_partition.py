@@ -61,9 +61,12 @@ def test_the_cut_mesh_is_a_new_object_of_exact_cells_with_uvs_and_groups():
         obj.data.materials.append(bpy.data.materials.new(name))
     for polygon in obj.data.polygons:
         polygon.material_index = int(polygon.center.x > 0)
+    own = bpy.data.materials.new("of the object")
+    obj.material_slots[1].link, obj.material_slots[1].material = "OBJECT", own
     bpy.context.view_layer.update()
     divide(write="MESH")
     new = bpy.context.object
+    assert [(s.link, s.material.name) for s in new.material_slots] == [("DATA", "left"), ("OBJECT", own.name)]
     assert [m.name for m in new.data.materials] == [m.name for m in obj.data.materials]
     assert all((p.center.x > 0) == (p.material_index == 1) for p in new.data.polygons if abs(p.center.x) > 1e-4)
     assert new.name == "Ball_cells" and len(bpy.data.objects) == 2 and "region" in new.vertex_groups

@@ -155,3 +155,15 @@ def test_short_paths_stay():
     network = network_of(V, F)
     for path in ([0, 1], [0, 1, 5, 0]):
         np.testing.assert_array_equal(straighten(network, [np.array(path)])[0], path)
+
+
+@pytest.mark.parametrize("sides", [(6, 10), (10, 6)])
+def test_a_lane_that_a_path_has_moved_to_is_no_longer_free(sides):
+    """Alone, either path goes there; of two, the first one does, and the second goes where it can."""
+    V, F, cost = grid_without_diagonals(12)
+    row = np.round(12 * V[:, 1]).astype(int)
+    network = network_of(V, F, np.where((row[edges_of(F)] == 8).all(axis=1), 0.05, cost))
+    paths = [k * 13 + np.arange(13) for k in sides]
+    assert all((row[straighten(network, [path])[0]] == 8).any() for path in paths)
+    one, other = straighten(network, paths)
+    assert (row[one] == 8).any() and not set(one) & set(other)

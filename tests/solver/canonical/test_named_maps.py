@@ -12,7 +12,7 @@ from omt_uv.solver.errors import BoundaryError, PinError
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.untangle import count_folds
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.chart_indices import ChartPins
@@ -92,3 +92,31 @@ def test_corners_of_a_rectangle_lie_along_its_boundary():
     domain = Rectangle(2.0, 1.0)
     assert corner_parameters(domain) == pytest.approx([0, 2, 3, 5, 6])
     assert domain.boundary_point(corner_parameters(domain)[:4]) == pytest.approx(domain.corners)
+
+
+def finger(rings, sectors=10):
+    """A closed tube of as many rings as are long, open at one end: a point of it is far from the boundary."""
+    angle, step = 2 * np.pi * np.arange(sectors) / sectors, 2 * np.sin(np.pi / sectors)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    V = np.concatenate([ring + [0, 0, k * step] for k in range(rings)] + [[[0, 0, (rings - 0.5) * step]]])
+    k, i = (x.ravel() for x in np.meshgrid(np.arange(rings - 1), np.arange(sectors), indexing="ij"))
+    a, b = k * sectors + i, k * sectors + (i + 1) % sectors
+    top = (rings - 1) * sectors + np.arange(sectors)
+    caps = np.column_stack([top, np.roll(top, -1), np.full(sectors, len(V) - 1)])
+    quads = [np.stack([a, b, b + sectors], 1), np.stack([a, b + sectors, a + sectors], 1)]
+    return V, np.concatenate([*quads, caps])
+
+
+@pytest.mark.parametrize("boundary", ["disk", "square", "rectangle"])
+@pytest.mark.parametrize(("rings", "balance"), [(30, 0.0), (30, 0.5), (38, 0.0)])
+def test_what_a_conformal_map_puts_in_one_place_has_its_cells_all_the_same(boundary, rings, balance):
+    """The hand of a model was refused, as its vertices were 8.5e-8 apart in the disk: cells are of another map then."""
+    V, F = finger(rings)
+    loop = boundary_loops(F)[0]
+    corners = None if boundary == "disk" else sharpest_corners(V, F, loop)
+    disk = NamedProblem(V, F, face_areas(V, F), boundary, corners, 1.0 if boundary == "square" else 0.0)
+    found = drain(polar_map(disk, balance))
+    assert sum("apart, too close for the transport; started from a mean value map" in x for x in found.warnings) == 1
+    mass = vertex_areas(V, F)
+    np.testing.assert_allclose(found.cells.cells.area, mass * found.cells.cells.area.sum() / mass.sum(), rtol=1e-5)
+    assert figures(disk, found.uv).folds == 0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
+from omt_uv.solver.cutting import crease_sides
 from omt_uv.solver.cutting.component import TurnedCopies, lone_edges
 from omt_uv.solver.cutting.crease_sides import cap_borders, hard_borders, hard_sides, side_borders
 from omt_uv.solver.cutting.gluing_facts import in_unit_box
@@ -477,3 +478,25 @@ def test_a_hard_body_that_was_triangulated_comes_apart_as_it_does_of_quads(turne
     )
     apart = borders_of(quads)
     assert apart and borders_of(triangle_surface(V, triangles_of(np.roll(Q, 1, axis=1) if turned else Q))) == apart
+
+
+@pytest.mark.parametrize("unrolls", [(True, True, False), (True, False, True), (True, False, False)])
+def test_what_has_joined_a_side_that_lies_apart_lies_apart_itself(unrolls, monkeypatch):
+    """Two small sides lie flat beside each other, but not beside the large one, from which they keep their border; only
+    where neither is one of those that lie apart does it go."""
+    V = np.array([[0, 0, 0], [100, 0, 0], [0, 20, 0], [1, 0, 0], [0, 2, 0], [0, 2.4, 0.0]])
+    component = SimpleNamespace(positions=V, triangles=np.array([[0, 1, 2], [0, 3, 4], [0, 3, 5]]))
+    flat = iter([True, False])
+    monkeypatch.setattr(crease_sides, "_lies_flat", lambda *_: next(flat))
+    monkeypatch.setattr(crease_sides, "_disks", lambda *_: np.zeros(3, bool))
+    left = crease_sides._without_crumbs(
+        component,
+        np.arange(3),
+        np.arange(3),
+        np.ones(2, bool),
+        np.array(unrolls),
+        np.arange(2),
+        np.array([[1, 2], [0, 1]]),
+        np.array([2.0, 1.0]),
+    )
+    assert left.tolist() == [False, any(unrolls[1:])]

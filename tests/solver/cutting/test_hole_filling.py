@@ -13,7 +13,7 @@ from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.analysis.seam_costs import SeamPreferences
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
-from omt_uv.solver.cutting.hole_filling import NO_POLYGON, fill_holes, hole_boundaries
+from omt_uv.solver.cutting.hole_filling import MANY, NO_POLYGON, fill_holes, hole_boundaries
 from omt_uv.solver.errors import NotADiskError
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -388,3 +388,17 @@ def test_a_hole_that_is_thrice_as_long_as_the_middle_one_stays_open(side, filled
         gone |= (middle[:, 0] > x) & (middle[:, 0] < x + size) & (middle[:, 1] > y) & (middle[:, 1] < y + size)
     warnings = cut_to_disks(triangle_surface(V, F[~gone]), sieve=3).warnings
     assert [text.partition(" are filled")[0] for text in warnings] == [f"{filled} holes"]
+
+
+@pytest.mark.parametrize(("long", "filled"), [(MANY - 1, 40), (MANY, MANY + 40)])
+def test_what_is_long_is_a_hole_where_there_are_too_many_for_outer_boundaries(long, filled):
+    """Holes of four cells' sides among forty of one: the outline is the longest, and so many are outer boundaries."""
+    V, F = meshes.grid(50, 60, 50.0, 60.0)
+    middle, gone = V[F].mean(axis=1), np.zeros(len(F), bool)
+    places = [(1 + 6 * (k % 8), 1 + 6 * (k // 8), 4) for k in range(long)]
+    places += [(1 + 2 * (k % 20), 50 + 3 * (k // 20), 1) for k in range(40)]
+    for x, y, size in places:
+        gone |= (middle[:, 0] > x) & (middle[:, 0] < x + size) & (middle[:, 1] > y) & (middle[:, 1] < y + size)
+    F = F[~gone]
+    found = fill_holes(triangle_surface(V, F), gluing_of(V, F), np.zeros(len(F), bool), sieve=8)
+    assert found.holes == filled

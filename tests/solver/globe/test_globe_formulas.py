@@ -238,3 +238,21 @@ def test_centres_of_equal_triangles_are_one_in_each(n):
     assert len(found) == len(cells) == n * n
     np.testing.assert_allclose(found.sum(axis=1), 1)
     assert sorted(map(tuple, found[:, :2].round(9))) == sorted(map(tuple, np.round(cells, 9)))
+
+
+@pytest.mark.parametrize(("low", "turn"), [(1.0, -1), (np.nextafter(1.0, 0), 0), (0.0, 0), (-0.25, 0), (-1.0, 1)])
+def test_a_face_that_begins_where_the_square_ends_is_brought_back(low, turn):
+    """Its middle is what counts on the left, and its least corner on the right."""
+    u = low + np.array([0.0, 0.5, 1.0])
+    corners = np.column_stack([u, [0.5, 0.6, 0.5]])
+    whole = unfolding.Unfolding(
+        uv=corners,
+        index=np.arange(3),
+        sign=np.ones(3),
+        offset=np.zeros((3, 2)),
+        fixed=np.zeros((3, 2), bool),
+        poles=np.zeros(3, bool),
+        missed=0,
+    )
+    back = brought_into_square(whole, triangle_polygons(np.array([[0, 1, 2]]))).corners()
+    np.testing.assert_array_equal(back, corners + [turn, 0])

@@ -367,3 +367,11 @@ def test_shear_is_told_up_to_a_million(height):
             assert found == pytest.approx(min(s[0] / s[1], 1e6), rel=1e-5)
         else:
             assert found == 1e6
+
+
+def test_where_a_face_without_area_lies_in_the_map_is_left_out_of_its_bounds():
+    V = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 2, 0.0]])
+    F = np.array([[0, 1, 2], [0, 2, 3]])
+    uv = np.array([[[0, 0], [1, 0], [1, 1]], [[-7, 0], [0, 9], [0, 5.0]]])
+    d = distortion(V, F, uv)
+    assert d.skipped_zero_area_faces == 1 and (d.uv_min, d.uv_max) == ((0, 0), (1, 1))

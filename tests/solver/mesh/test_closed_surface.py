@@ -85,3 +85,16 @@ def test_refused(name):
     mesh, error, text = WRONG[name]
     with pytest.raises(error, match=text):
         closed_surface(*mesh)
+
+
+@pytest.mark.parametrize(
+    ("name", "chart", "body"),
+    [("torus", "unwrap it with cuts", "fill the tunnels through it"), ("open", "as a chart", "the library tetwild")],
+)
+def test_what_is_inside_of_a_surface_is_in_no_chart_of_it(name, chart, body):
+    """A body was told to be unwrapped with cuts, which maps nothing of its inside."""
+    mesh = WRONG[name][0]
+    for inside, text, other in ((False, chart, body), (True, body, chart)):
+        with pytest.raises(NotASphereError) as caught:
+            closed_surface(*mesh, body=inside)
+        assert text in str(caught.value) and other not in str(caught.value)

@@ -116,3 +116,17 @@ def test_fans_are_the_polygons_around_their_centres():
             np.testing.assert_allclose(both[middle[0]], V[around].mean(axis=0), atol=1e-9)
             whole = face_areas(V, F)[owner == k].sum()
             np.testing.assert_allclose(face_areas(both, mine), whole / len(mine), rtol=1e-9)
+
+
+@pytest.mark.parametrize("dent", [-1e-3, -1e-5, 1e-6, 1e-2])
+@pytest.mark.parametrize("short", [1.0, 1e-4])
+@pytest.mark.parametrize("turn", range(5))
+def test_a_corner_is_straight_by_its_angle_alone_whatever_its_sides_measure(dent, short, turn):
+    """The angle of what turns by `dent` is the same between long sides and beside a short one, in either order."""
+    angle = np.cumsum([0.0, -dent, 2.0, 1.5])
+    for length in ([short, 1.0, 1.0], [1.0, short, 1.0]):
+        w = np.concatenate([[0j], np.cumsum(length * np.exp(1j * angle[:3]))])
+        w = np.append(w, w[-1] + 0.5 * np.exp(1j * angle[3]))
+        F, owner = polygons.cut([np.roll(np.arange(5), turn)], turn)
+        V = np.column_stack([w.real, w.imag, np.zeros(5)])
+        assert len(polygon_fans(V, F, owner)[1]) == (5 if dent < 0 else 0)

@@ -104,3 +104,19 @@ def test_a_map_is_smoothed_where_it_is_tense_and_valid_before_and_after(
     found = drain(run())
     assert (found is after) == (tense and not crosses and not folds and not ends_crossing)
     assert found is before or found is after
+
+
+def test_energies_of_quads_that_are_measured_anew_are_those_of_tilted_targets(monkeypatch):
+    """As those before and after them: a chart that is not on its way any more keeps its own."""
+    charts, w, _ = together(["some"] * 4)
+    area_weight, multiplier = np.array([1.0, 3.0, 10.0, 0.5]), np.array([0.0, 2.0, -5.0, 0.7])
+    live, old = np.array([True, True, False, True]), np.array([1.0, 2.0, 3.0, 4.0])
+    continuation = SimpleNamespace(multiplier=multiplier, area_weight=area_weight, live=live, value=old)
+    new = replace(charts.faces, area=1.1 * charts.faces.area)
+    monkeypatch.setattr(batch_refine, "with_convex_quads", lambda faces, _: new)
+    charts._select_quads(w, area_weight[charts.of_face], continuation)
+    assert charts.faces is new
+    expected = charts._energies(charts._tilted(continuation, area_weight), w, area_weight[charts.of_face])
+    np.testing.assert_array_equal(continuation.value, np.where(live, expected, old))
+    plain = charts._energies(new, w, area_weight[charts.of_face])
+    assert (np.isfinite(expected) & (plain != expected) & live).sum() >= 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from meshes import bumpy, icosphere, torus
@@ -16,6 +18,7 @@ from omt_uv.solver.errors import (
 )
 from omt_uv.solver.progress import drain
 from omt_uv.solver.registration import RegistrationOptions, vertex_landmarks
+from omt_uv.solver.registration import register as registering
 from omt_uv.solver.registration.domains import domain_map, filled
 from omt_uv.solver.registration.register import register
 from omt_uv.solver.registration.results import stretches
@@ -161,3 +164,20 @@ def test_bad_input_is_named():
         match((V, F), (V, F), (chosen[:2], chosen[[0, 0]]))
     with pytest.raises(ValueError, match="domain"):
         RegistrationOptions(domain="torus")
+
+
+def test_how_far_landmarks_are_off_is_a_share_of_the_target_however_long_the_source_is(monkeypatch):
+    V, F, chosen = shape()
+    W, G, name = renumbered(V * [2.0, 0.9, 1.0], F)
+    polished = registering._polished
+
+    def shifted(case, *rest):
+        placed, steps = yield from polished(case, *rest)
+        moved = placed.positions.copy()
+        extent = np.ptp(case.pair.target.vertices, axis=0).max()
+        moved[case.pair.landmarks] = case.targets.positions + [1e-3 * extent, 0, 0]
+        return replace(placed, positions=moved), steps
+
+    monkeypatch.setattr(registering, "_polished", shifted)
+    found = match((V, F), (W, G), (chosen, name[chosen]))
+    np.testing.assert_allclose(found.residuals, 1e-3, rtol=1e-6)

@@ -10,6 +10,7 @@ from omt_uv.solver.mesh.closed_surface import closed_surface
 from omt_uv.solver.mesh.polygon_areas import polygon_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
+from omt_uv.solver.sphere import sphere_map as spheres
 from omt_uv.solver.sphere.polygon_surface import PolygonSurface, with_polygon_fans
 from omt_uv.solver.sphere.sphere_map import sphere_map
 
@@ -53,3 +54,15 @@ def test_triangles_and_quads_need_no_fans():
     surface = closed_surface(V, F)
     assert with_polygon_fans(PolygonSurface(surface, polygons, np.ones(len(F)))) is None
     assert with_polygon_fans(PolygonSurface(surface, None, np.ones(len(F)))) is None
+
+
+@pytest.mark.parametrize("pairs", [0, 1, 3])
+def test_the_joined_share_is_of_triangles_of_which_a_quad_has_two(pairs):
+    joined = np.arange(12)
+    joined[1 : 2 * pairs : 2] = joined[: 2 * pairs : 2]
+    assert spheres._joined_share(joined, None) == pairs * 2 / 12
+    # What was one polygon before has not been joined.
+    before = np.arange(12)
+    before[[9, 11]] = 10
+    joined[[9, 11]] = 10
+    assert spheres._joined_share(joined, before) == pairs * 2 / 12

@@ -78,3 +78,22 @@ def test_the_parameter_of_any_point_is_that_of_the_nearest_one_of_the_boundary(d
     many = domain.boundary_point(np.linspace(0, domain.period, 4000, endpoint=False))
     nearest = np.linalg.norm(points[:, None] - many, axis=2).min(axis=1)
     assert (np.linalg.norm(points - domain.boundary_point(found), axis=1) <= nearest + 1e-12).all()
+
+
+@pytest.mark.parametrize("name", ["rectangle", "pentagon"])
+def test_lines_along_a_side_are_in_the_polygon_for_its_length(name):
+    """Both ends are inside or on a side, as are all points between them."""
+    polygon = DOMAINS[name]
+    if name == "rectangle":
+        origin, direction = (
+            np.array([[0.0, -0.25], [1.5, 0.0], [0.0, 0.2500001]]),
+            np.array([[1.0, 0], [0, -1.0], [1, 0]]),
+        )
+        enter, leave = polygon.clip(origin, direction)
+        np.testing.assert_allclose(leave[:2] - enter[:2], [3.0, 0.5])
+        assert enter[2] > leave[2]
+    else:
+        enter, leave = polygon.clip(polygon.corners, polygon.tangent)
+        off = np.abs(polygon.tangent @ polygon.normal.T) == 0
+        assert off.any(axis=1).any()
+        np.testing.assert_allclose((leave - enter)[off.any(axis=1)], polygon.length[off.any(axis=1)])

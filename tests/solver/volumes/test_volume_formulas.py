@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -248,3 +249,32 @@ def test_the_boundary_comes_first_and_nothing_is_lost():
     assert len(found) == len(points) - 1 and np.unique(boundary).tolist() == list(range(boundary.max() + 1))
     np.testing.assert_array_equal(found[renamed], points[tets + 1])
     np.testing.assert_array_equal(found[boundary], points[tet_mesh.boundary_triangles(tets + 1)])
+
+
+def test_shares_of_inverted_tetrahedra_are_negative():
+    points, tets = ball()
+    there = points.copy()
+    there[tets[3, 0]] *= -3
+    volume = tet_mesh.tet_volumes(there, tets)
+    assert (volume < 0).any()
+    target = np.arange(1.0, len(tets) + 1)
+    expected = sum(abs(v / sum(volume) - t / sum(target)) for v, t in zip(volume, target, strict=True))
+    assert tet_mesh.share_error(there, tets, target) == pytest.approx(expected)
+
+
+def test_flat_and_inverted_tetrahedra_have_a_dilation_on_either_side():
+    """A body that a library filled may have some: what has no share there is as far out as what has least in a map."""
+    points, tets = ball()
+    flat = points.copy()
+    flat[tets[0, 3]] = flat[tets[0, 0]]
+    flat[tets[5, 0]] *= -3
+    volume = tet_mesh.tet_volumes(flat, tets)
+    assert (volume == 0).any() and (volume < 0).any()
+    for here, there in ((flat, points), (points, flat), (flat, flat)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = dilation(here, there, tets)
+        assert np.isfinite(found).all()
+        wrong = tet_mesh.tet_volumes(here, tets) <= 0
+        share = tet_mesh.tet_volumes(there, tets) / tet_mesh.tet_volumes(there, tets).sum()
+        assert found[wrong] == pytest.approx(np.log2(np.maximum(1e3 * len(tets) * share[wrong], 1)))
