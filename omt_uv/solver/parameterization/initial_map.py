@@ -78,8 +78,8 @@ UNROLLED = 1e-2
 # step of all vertices where sweeps bring the areas of a draft. With an outline those of at most COARSE_ABOVE have
 # shorter a way from an embedding by evened weights, and shear less.
 DRAFT_ABOVE = 600
-DRAFT_COARSE_ABOVE = 2000
-DRAFT_COARSER = 6
+DRAFT_COARSE_ABOVE = 3000
+DRAFT_COARSER = 4
 DRAFT_SPREAD = 0.03
 DRAFT_SWEEPS = 16
 # What comes back is smoothed so many times, with these area weights.

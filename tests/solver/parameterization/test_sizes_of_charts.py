@@ -140,7 +140,7 @@ def test_only_a_hopeless_embedding_gives_way_to_one_that_scales_evenly(energy, e
 
 @pytest.mark.parametrize(
     "far, draft, goal, enough, again",
-    [(False, False, 8, 0.25, 5000), (True, False, 5, 0.4, 20_000), (False, True, 6, 0.25, 2000)],
+    [(False, False, 8, 0.25, 5000), (True, False, 5, 0.4, 20_000), (False, True, 4, 0.25, 3000)],
 )
 def test_meshes_are_coarsened_by_a_factor_and_only_where_it_pays(far, draft, goal, enough, again, monkeypatch):
     count, asked = int(again / enough), []

@@ -14,6 +14,7 @@ from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import vertex_sweeps as smoothing
 
 WEIGHT = 30.0
+NEVER = 1e-12  # an area error that no map has
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def test_sweeps_lower_the_energy_and_leave_the_boundary(chart):
 
 def test_sweeps_end_at_the_first_map_that_has_its_areas(chart):
     faces, w, _ = chart
-    maps = [drain(smoothing.smoothed(faces, w, WEIGHT, k)) for k in range(1, 7)]
+    maps = [drain(smoothing.smoothed(faces, w, WEIGHT, k, goal=NEVER)) for k in range(1, 7)]
     errors = [area_error(faces, one) for one in maps]
     assert (np.diff(errors) < 0).all()
     for k, error in enumerate(errors):
@@ -50,6 +51,17 @@ def test_sweeps_end_at_the_first_map_that_has_its_areas(chart):
         np.testing.assert_array_equal(drain(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=goal)), maps[k])
     far = drain(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=errors[-1] / 2))
     np.testing.assert_array_equal(far, maps[-1])
+
+
+def test_sweeps_to_an_area_error_go_beyond_the_least_energy_but_for_the_first(chart):
+    faces, w, loop = chart
+    once, plain = (drain(smoothing.smoothed(faces, w, WEIGHT, 1, goal=goal)) for goal in (NEVER, 0.0))
+    np.testing.assert_array_equal(once, plain)
+    for sweeps in (2, 4, 6):
+        near, far = (drain(smoothing.smoothed(faces, w, WEIGHT, sweeps, goal=goal)) for goal in (NEVER, 0.0))
+        assert area_error(faces, near) < area_error(faces, far)
+        assert (faces.areas(near) > 0).all()
+        np.testing.assert_array_equal(near[loop], w[loop])
 
 
 def test_boundaries_move_and_do_not_come_to_cross_themselves(chart):
