@@ -151,11 +151,14 @@ def standing(
     or their face, and for what has legs and does not stand on these. Files do not say what is up, and of two that most
     have one is taken for the other.
     """
-    if plane is None or axes is None or abs(plane.normal @ axes.viewer) > LEANING:
+    if plane is None or axes is None:
         return axes
-    viewer = unit(np.array(axes.viewer, float) - (plane.normal @ axes.viewer) * plane.normal)
-    on_its_side = abs(plane.normal @ axes.up) > LEANING
-    up = np.cross(viewer, plane.normal) if on_its_side else np.array(axes.up, float)
+    up, viewer = (unit(np.array(v, float)) for v in (axes.up, axes.viewer))
+    if abs(plane.normal @ viewer) > LEANING:
+        return axes
+    viewer = unit(viewer - (plane.normal @ viewer) * plane.normal)
+    on_its_side = abs(plane.normal @ up) > LEANING
+    up = np.cross(viewer, plane.normal) if on_its_side else up
     up = unit(up - (up @ plane.normal) * plane.normal - (up @ viewer) * viewer)
     # Set up, its head or its feet are where the viewer was.
     legs = _stands_on(positions, triangles, plane, viewer, up)

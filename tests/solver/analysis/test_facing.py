@@ -78,8 +78,8 @@ def test_a_head_that_lies_stands_as_if_it_were_set_up_seen_from_its_front(up, vi
     np.testing.assert_allclose(found.viewer, [1, 0, 0], atol=0.02)
     np.testing.assert_allclose(found.up, [0, 0, -viewer * up], atol=0.02)
     np.testing.assert_allclose(looks_to(V, F, found).front, [1, 0, 0], atol=0.02)
-    # Size, place and order of the faces do not matter.
-    moved = stands(100 * V + [5, 3, -2], F[::-1], axes)
+    # Size, place and order of the faces, and how long axes are, do not matter.
+    moved = stands(100 * V + [5, 3, -2], F[::-1], SceneAxes((7.0 * up, 0.0, 0.0), (0.0, 0.0, 5.0 * viewer)))
     np.testing.assert_allclose([moved.up, moved.viewer], [found.up, found.viewer], atol=1e-3)
 
 
