@@ -51,6 +51,9 @@ HOOVES = (0.1, 0.7)
 WHOLE = 0.05
 # Certainty that a figure looks at who sees it in the front view, where what stands out does not tell otherwise.
 FIGURE = 0.8
+# Its head is the highest share of it, and has its face on the side that shows so many times as much as the other.
+CROWN = 0.18
+FACE = 3.0
 # How far what is flat may lean, and be off what is below, in radians.
 FLAT = np.pi / 18
 TILTED = np.pi / 5
@@ -125,10 +128,15 @@ def facing(
         off -= (off @ up) * up
     certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1 if plane is not None else UNSURE))
     if plane is not None and viewer.any() and _is_figure(positions, triangles, plane, up):
-        ahead_of_it = unit(np.cross(up, plane.normal))
-        ahead_of_it *= np.sign(ahead_of_it @ viewer)
-        if off @ ahead_of_it >= 0 and abs(ahead_of_it @ viewer) > 1 - LEANING:
-            certainty, off = max(certainty, FIGURE), ahead_of_it
+        there = unit(np.cross(up, plane.normal))
+        there = there if there @ viewer >= 0 else -there
+        here, behind = _salient_views(
+            positions, triangles, saliency, plane, np.stack([there, -there]), _on_top(positions, triangles, up)
+        )
+        if behind > FACE * here:
+            certainty, off = max(certainty, FIGURE), -there
+        elif here > FACE * behind or (off @ there >= 0 and there @ viewer > 1 - LEANING):
+            certainty, off = max(certainty, FIGURE), there
     front = unit(off) if certainty else np.zeros(3)
     return Facing(front, up, certainty, float(np.clip((high @ front - BEAST[0]) / (BEAST[1] - BEAST[0]), 0, 1)))
 
@@ -138,6 +146,12 @@ def _is_figure(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlan
     used = positions[triangles].reshape(-1, 3)
     long = np.ptp(used @ np.cross(up, plane.normal)) < LONG * np.ptp(used @ up)
     return bool(long) and _legs(positions, triangles, plane, -up, LEGS) > 0
+
+
+def _on_top(positions: np.ndarray, triangles: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Triangles (m,) bool that are in the highest part of a body."""
+    height = (positions @ up)[triangles]
+    return height.min(axis=1) >= height.max() - CROWN * np.ptp(height)
 
 
 def standing(
@@ -214,12 +228,19 @@ def _gaps(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ah
 
 
 def _salient_views(
-    positions: np.ndarray, triangles: np.ndarray, saliency: np.ndarray, plane: SymmetryPlane, directions: np.ndarray
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    saliency: np.ndarray,
+    plane: SymmetryPlane,
+    directions: np.ndarray,
+    part: np.ndarray | None = None,
 ) -> list[float]:
-    """How salient (d,) what a body shows in the middle of its views from directions (d,3) within its mirror plane is:
-    a face, and no outline of a crown or a neck."""
-    area, areas = vertex_areas(positions, triangles), face_areas(positions, triangles)
-    eyes = (area_near := _near(positions, area, plane)) * salient_weights(saliency, area, SALIENT)
+    """How salient (d,) what a body, or a part (m,) bool of it, shows in the middle of its views from directions (d,3)
+    within its mirror plane is: a face, and no outline of a crown or a neck."""
+    part = np.ones(len(triangles), bool) if part is None else part
+    area, areas = vertex_areas(positions, triangles[part]), face_areas(positions, triangles) * part
+    near = _near(positions, vertex_areas(positions, triangles), plane)
+    eyes = near * salient_weights(saliency, area, SALIENT)
     found = []
     for direction, shown in zip(directions, in_view(positions, triangles, directions), strict=True):
         across = (positions @ np.cross(direction, plane.normal))[triangles].mean(axis=1)
@@ -229,7 +250,7 @@ def _salient_views(
             continue
         off = across - weight @ across / weight.sum()
         weight = weight * np.exp(-0.5 * off**2 * weight.sum() / max(weight @ off**2, np.finfo(float).tiny))
-        total = weight @ area_near[triangles].mean(axis=1)
+        total = weight @ near[triangles].mean(axis=1)
         found.append(float(weight @ eyes[triangles].mean(axis=1) / max(total, np.finfo(float).tiny)))
     return found
 

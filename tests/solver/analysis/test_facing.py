@@ -5,7 +5,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.facing import FIGURE, UNSURE, SceneAxes, _is_figure, facing, standing, towards, with_a_face
+from omt_uv.solver.analysis.facing import (
+    CROWN,
+    FIGURE,
+    UNSURE,
+    SceneAxes,
+    _is_figure,
+    _on_top,
+    facing,
+    standing,
+    towards,
+    with_a_face,
+)
 from omt_uv.solver.analysis.saliency import saliency, unit_size
 from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane, symmetry_plane
 
@@ -121,6 +132,20 @@ def test_a_figure_looks_at_the_viewer_where_nothing_speaks_against_it(side):
     assert aside.certainty < FIGURE
     face = np.where((V[:, 0] * side < 0) & (V[:, 2] > 0.7), 1.0, 0.0) * np.linspace(0.5, 1, len(V))
     assert facing(V, F, face, plane, axes).front @ axes.viewer < -0.99
+
+
+def test_a_published_figure_looks_where_its_face_is_wherever_it_is_seen_from():
+    V, F = published("homer")
+    for viewer in (1.0, -1.0):
+        seen = looks_to(V, F, SceneAxes((0.0, 1.0, 0.0), (0.0, 0.0, viewer)))
+        assert seen.front[2] > 0.99 and seen.certainty >= FIGURE
+
+
+def test_the_top_of_a_body_is_what_lies_wholly_in_its_highest_share():
+    V, F = meshes.icosphere(3)
+    top = _on_top(V, F, np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_array_equal(top, (V[F, 2] >= 1 - CROWN * 2).all(axis=1))
+    assert 0 < top.sum() < len(F)
 
 
 def test_what_stands_or_cannot_be_told_is_believed():
