@@ -53,12 +53,12 @@ def smoothed(
     del faces
     for k in range(sweeps):
         start = w.copy()
-        reach = BEYOND if aim is not None and k else 1.0
-        _sweep(sets, w, area_weight, reach=reach)
+        stride = BEYOND if aim is not None and k else 1.0
+        _sweep(sets, w, area_weight, stride=stride)
         # Most sweeps let no edges cross. Those that do are done again, and looked at set by set.
         if loop is not None and len(crossings_on_the_way(start, w - start, loop, (1.0, ROOM))):
             w = start
-            _sweep(sets, w, area_weight, loop, reach)
+            _sweep(sets, w, area_weight, loop, stride)
         yield Progress("Smoothing", (k + 1) / sweeps)
         if aim is not None and area_error(aim, w) <= goal:
             break
@@ -85,12 +85,14 @@ def smoothed_uv(
     return np.column_stack([w.real, w.imag])
 
 
-def _sweep(sets: list, w: np.ndarray, area_weight: float, loop=None, reach: float = 1.0) -> None:
-    """Move the vertices of all sets within their stars, in place, and take back what lets edges of a loop cross; reach:
-    of their steps, in Newton's."""
+def _sweep(sets: list, w: np.ndarray, area_weight: float, loop=None, stride: float = 1.0) -> None:
+    """Move the vertices of all sets within their stars, in place, and take back what lets edges of a loop cross.
+
+    stride : of their steps, in Newton's
+    """
     for vertex, row, star in sets:
         before = None if loop is None else w.copy()
-        relax(vertex, row, star, w, area_weight, 1, reach=reach)
+        relax(vertex, row, star, w, area_weight, 1, stride=stride)
         if before is not None:
             _uncross(w, before, loop)
 
@@ -223,12 +225,12 @@ def relax(
     area_weight: float,
     steps: int,
     fixed=False,
-    reach: float = 1.0,
+    stride: float = 1.0,
 ) -> None:
     """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
 
     row (s,): which of the vertices is the first corner of a face of the stars, ascending; fixed: vertices (k,) bool
-    that stay; reach: how far they go at most, in Newton's steps.
+    that stay; stride: how far they go at most, in Newton's steps.
     """
     # No vertex of one part is a neighbour of those of another: what is computed of a part stays in the cache.
     parts = np.arange(0, len(row), PART)
@@ -237,7 +239,7 @@ def relax(
     for a, b, c, d in zip(first[:-1], first[1:], begin[:-1], begin[1:], strict=True):
         some = faces if isinstance(faces, Elements) and d - c == len(row) else _rows(faces, slice(c, d))
         stay = np.broadcast_to(fixed, len(vertex))[a:b]
-        _relax(vertex[a:b], row[c:d] - a, some, w, area_weight, (steps, reach), stay)
+        _relax(vertex[a:b], row[c:d] - a, some, w, area_weight, (steps, stride), stay)
 
 
 def _rows(faces: Elements | _Stars, some: slice) -> Elements:
@@ -258,15 +260,15 @@ def _relax(
     steps: tuple[int, float],
     fixed: np.ndarray,
 ) -> None:
-    """`relax` of all at once; steps: how many, and their reach."""
-    count, reach = steps
+    """`relax` of all at once; steps: how many, and their stride."""
+    count, stride = steps
     k, before = len(vertex), w[vertex]
     around = _around(faces, w)
     first = value = np.bincount(row, around.energies(area_weight), k)
     for _ in range(count):
         step = _directions(row, around, area_weight, k)
         step[fixed] = 0
-        moved, value = _searched(row, around, reach * step, area_weight, value)
+        moved, value = _searched(row, around, stride * step, area_weight, value)
         w[vertex] += moved
         around = around.moved(moved[row]) if count > 1 else around
     # What was followed from step to step has its own rounding: on slivers it may have lost a fold.

@@ -74,7 +74,7 @@ def whole(monkeypatch):
         **options,
     ):
         taken, maps = [], [mapped()]
-        made = cut(search="search" if search else None)
+        made = cut(search=SimpleNamespace(axes="axes") if search else None)
 
         def step(name, value):
             def taking(*words, **_):
@@ -147,6 +147,8 @@ def test_steps_of_an_unwrapping(given, steps, whole):
     missed = () if not searched else ("missed",) if steps.count("bound") == 1 else ("again",)
     assert found.warnings == ("repaired", *(("further",) if searched else ()), *missed)
     assert len(found.maps) == (given.get("parts", 1) if "pieces" in steps else 1)
+    # How the surface stands is known where seams were searched.
+    assert found.axes == ("axes" if given.get("search", True) else None)
 
 
 def test_progress_of_an_unwrapping_goes_to_its_end_by_its_parts(whole):
