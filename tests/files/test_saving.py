@@ -128,7 +128,7 @@ def test_a_blend_of_any_name_becomes_an_fbx_with_its_images(package, tmp_path, n
     bpy.ops.wm.save_as_mainfile(filepath=str(plain))
     image.filepath = "//wood.png"
     bpy.ops.wm.save_as_mainfile(filepath=str(plain))
-    plain.with_suffix(".blend1").unlink()
+    plain.with_suffix(".blend1").unlink(missing_ok=True)
     given = plain.rename(tmp_path / f"{name}.blend")
     before = given.read_bytes()
     bpy.ops.wm.open_mainfile(filepath=str(given))

@@ -124,7 +124,7 @@ def test_diagrams_are_those_of_the_largest_chart_in_its_domain(domain, monkeypat
     def chart(shift, triangles):
         return SimpleNamespace(vertices=V + shift, triangles=triangles, disk=triangles)
 
-    charts = SimpleNamespace(charts=[chart(5, F[:2]), chart([3, 4, 5], F), chart(7, F[:3])])
+    charts = SimpleNamespace(charts=[chart(5, F[:2]), chart([3, 4, 5], F), chart(7, F[:3])], warnings=("cut", "both"))
     monkeypatch.setattr(
         diagrams, "disk_charts", lambda surface, faces, fill_holes: worked(charts if not fill_holes else None)
     )
@@ -134,7 +134,7 @@ def test_diagrams_are_those_of_the_largest_chart_in_its_domain(domain, monkeypat
     def polar(problem):
         asked["problem"] = problem
         cells = SimpleNamespace(site_weights="weights", residual=0.5, iterations=6)
-        return worked(SimpleNamespace(cells=cells, sites="sites", uv=V[:, :2] * [4, 3]))
+        return worked(SimpleNamespace(cells=cells, sites="sites", uv=V[:, :2] * [4, 3], warnings=("both", "map")))
 
     def planar(sites, weights, shape):
         asked["shape"] = (sites, weights, shape)
@@ -156,6 +156,7 @@ def test_diagrams_are_those_of_the_largest_chart_in_its_domain(domain, monkeypat
         and found.shares.sum() == pytest.approx(1)
         and (found.residual, found.iterations) == (0.5, 6)
     )
+    assert found.warnings == ("cut", "both", "map")
     assert fractions == pytest.approx([0, 0.2, 0.2, 1.0])
 
 
