@@ -217,8 +217,7 @@ def _legs(
 def _gaps(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray) -> tuple[float, float]:
     """Shares of the length of a body along a direction (3,) from its rear and front ends on with nothing on its mirror
     plane."""
-    area = vertex_areas(positions, triangles)
-    height = ((positions - area @ positions / area.sum()) @ plane.normal)[triangles]
+    height = _depth(positions, vertex_areas(positions, triangles), plane)[triangles]
     along = (positions @ ahead)[triangles]
     across = (height.min(axis=1) <= 0) & (height.max(axis=1) >= 0)
     low, high = along.min(), along.max()
@@ -270,8 +269,13 @@ def _flat_share(points: np.ndarray, direction: np.ndarray, ahead: np.ndarray) ->
 
 def _near(positions: np.ndarray, area: np.ndarray, plane: SymmetryPlane) -> np.ndarray:
     """How near vertices (n,3) with areas (n,) are to a plane through their middle, (n,) in [0, 1]."""
-    depth = (positions - area @ positions / area.sum()) @ plane.normal
+    depth = _depth(positions, area, plane)
     return np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
+
+
+def _depth(positions: np.ndarray, area: np.ndarray, plane: SymmetryPlane) -> np.ndarray:
+    """How far off a plane through their middle vertices (n,3) with areas (n,) lie, (n,): of it the normal counts."""
+    return (positions - area @ positions / area.sum()) @ plane.normal
 
 
 def with_a_face(positions: np.ndarray, triangles: np.ndarray, seen: Facing) -> np.ndarray:
