@@ -51,7 +51,11 @@ HOOVES = (0.1, 0.7)
 WHOLE = 0.05
 # Certainty that a figure looks at who sees it in the front view, where what stands out does not tell otherwise.
 FIGURE = 0.8
-# Its head is the highest share of it, and has its face on the side that shows so many times as much as the other.
+# The feet of a beast are its lowest share. Its head is ahead of them, with such a share of its area, and so many times
+# as much as is behind them.
+FEET = 0.12
+OVERHANG = (0.1, 4.0)
+# A figure's head is its highest share, and has its face on the side that shows so many times as much as the other.
 CROWN = 0.18
 FACE = 3.0
 # How far what is flat may lean, and be off what is below, in radians.
@@ -127,25 +131,57 @@ def facing(
     if up.any():
         off -= (off @ up) * up
     certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1 if plane is not None else UNSURE))
-    if plane is not None and viewer.any() and _is_figure(positions, triangles, plane, up):
-        there = unit(np.cross(up, plane.normal))
-        there = there if there @ viewer >= 0 else -there
-        here, behind = _salient_views(
-            positions, triangles, saliency, plane, np.stack([there, -there]), _on_top(positions, triangles, up)
-        )
-        if behind > FACE * here:
-            certainty, off = max(certainty, FIGURE), -there
-        elif here > FACE * behind or (off @ there >= 0 and there @ viewer > 1 - LEANING):
-            certainty, off = max(certainty, FIGURE), there
+    if plane is not None and up.any():
+        told = _told_by_shape(positions, triangles, saliency, plane, SceneAxes(tuple(up), tuple(viewer)), off)
+        certainty, off = (certainty, off) if told is None else (max(certainty, FIGURE), told)
     front = unit(off) if certainty else np.zeros(3)
     return Facing(front, up, certainty, float(np.clip((high @ front - BEAST[0]) / (BEAST[1] - BEAST[0]), 0, 1)))
 
 
-def _is_figure(positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, up: np.ndarray) -> bool:
-    """Whether a body is long and stands on two legs."""
+def _told_by_shape(
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    saliency: np.ndarray,
+    plane: SymmetryPlane,
+    axes: SceneAxes,
+    off: np.ndarray,
+) -> np.ndarray | None:
+    """Where (3,) a body that stands looks to by how it stands: a beast where it overhangs its feet, a figure where its
+    head has a face, and what is higher than deep to who sees it, if what stands out, off (3,), speaks not against it.
+    None where that does not tell."""
+    up, viewer = np.array(axes.up), np.array(axes.viewer)
     used = positions[triangles].reshape(-1, 3)
-    long = np.ptp(used @ np.cross(up, plane.normal)) < LONG * np.ptp(used @ up)
-    return bool(long) and _legs(positions, triangles, plane, -up, LEGS) > 0
+    there = unit(np.cross(up, plane.normal))
+    there = there if there @ viewer >= 0 else -there
+    depth = np.ptp(used @ there) / np.ptp(used @ up)
+    if depth > 1:
+        ahead_of = _overhangs(positions, triangles, plane, there, up)
+        return ahead_of * there if ahead_of else None
+    seen = there @ viewer > 1 - LEANING and off @ there >= 0
+    if depth < LONG and _legs(positions, triangles, plane, -up, LEGS) > 0:
+        here, behind = _salient_views(
+            positions, triangles, saliency, plane, np.stack([there, -there]), _on_top(positions, triangles, up)
+        )
+        if behind > FACE * here:
+            return -there
+        return there if here > FACE * behind or seen else None
+    return there if depth < LOW and seen else None
+
+
+def _overhangs(
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, ahead: np.ndarray, up: np.ndarray
+) -> int:
+    """Whether a body on legs has much more before its feet than behind these along a direction (3,): 1; the other way
+    round: -1; neither, or no legs: 0. Heads are ahead of forefeet, rumps are above hind feet."""
+    if _legs(positions, triangles, plane, -up, HOOVES) <= 0:
+        return 0
+    area, along, height = vertex_areas(positions, triangles), positions @ ahead, positions @ up
+    used = area > 0
+    feet = along[used & (height < height[used].min() + FEET * np.ptp(height[used]))]
+    before, behind = (area[beyond].sum() / area.sum() for beyond in (along > feet.max(), along < feet.min()))
+    if max(before, behind) < OVERHANG[0] or max(before, behind) < OVERHANG[1] * min(before, behind):
+        return 0
+    return 1 if before > behind else -1
 
 
 def _on_top(positions: np.ndarray, triangles: np.ndarray, up: np.ndarray) -> np.ndarray:

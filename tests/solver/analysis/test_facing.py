@@ -10,7 +10,6 @@ from omt_uv.solver.analysis.facing import (
     FIGURE,
     UNSURE,
     SceneAxes,
-    _is_figure,
     _on_top,
     facing,
     standing,
@@ -126,12 +125,51 @@ def test_a_figure_looks_at_the_viewer_where_nothing_speaks_against_it(side):
     V, F = figure()
     seen = facing(V, F, np.zeros(len(V)), plane, axes)
     assert seen.front @ axes.viewer > 0.99 and seen.certainty >= FIGURE
-    assert not _is_figure(*figure(0.1), plane, seen.up) and not _is_figure(V * [4, 1, 1], F, plane, seen.up)
     # Seen from its side, or from behind when its face is very salient.
     aside = facing(*figure(), np.zeros(len(figure()[0])), plane, SceneAxes((0.0, 0.0, 1.0), (0.0, side, 0.0)))
     assert aside.certainty < FIGURE
     face = np.where((V[:, 0] * side < 0) & (V[:, 2] > 0.7), 1.0, 0.0) * np.linspace(0.5, 1, len(V))
     assert facing(V, F, face, plane, axes).front @ axes.viewer < -0.99
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_is_higher_than_deep_looks_at_the_viewer_if_nothing_speaks_against_it(side):
+    """As whoever sits, or an urn: no legs to see, and its front view is what is looked at."""
+    plane = SymmetryPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, None)
+    axes = SceneAxes((0.0, 0.0, 1.0), (side, 0.0, 0.0))
+    V, F = meshes.icosphere(3)
+    none = np.zeros(len(V))
+    for depth, sure in ((0.8, True), (0.95, False), (1.5, False)):
+        seen = facing(unit_size(V * [depth, 0.5, 1], F), F, none, plane, axes)
+        assert (seen.certainty >= FIGURE) == sure and seen.front @ axes.viewer > 0.99
+    away = np.where(V[:, 0] * side < -0.9, 1.0, 0.0) * np.linspace(0.5, 1, len(V))
+    assert facing(unit_size(V * [0.8, 0.5, 1], F), F, away, plane, axes).front @ axes.viewer < -0.99
+    aside = facing(unit_size(V * [0.8, 0.5, 1], F), F, none, plane, SceneAxes(axes.up, (0.0, side, 0.0)))
+    assert aside.certainty < FIGURE
+
+
+def beast(overhang, legs=0.4):
+    """A beast of boxes that holds its head low, Z up, mirrored in the plane y = 0: it is ahead of its feet, x > 0."""
+    V, F = meshes.cube()
+    V = V - V.mean(axis=0)
+    places = [((overhang / 2, 0, legs / 2 + 0.4), (1 + overhang, 0.4, 0.8 - legs))]
+    places += [((ahead, side, legs / 2), (0.1, 0.1, legs)) for ahead in (-0.45, 0.45) for side in (-0.15, 0.15)]
+    return (
+        np.concatenate([V / np.ptp(V, axis=0) * size + place for place, size in places]),
+        np.concatenate([F + k * len(V) for k in range(len(places))]),
+    )
+
+
+@pytest.mark.parametrize("ahead", [1.0, -1.0])
+def test_a_beast_looks_where_it_is_ahead_of_its_feet_whatever_stands_out_at_its_rump(ahead):
+    plane = SymmetryPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, None)
+    axes = SceneAxes((0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
+    for overhang, legs, told in ((0.5, 0.4, True), (0.0, 0.4, False), (0.5, 0.05, False)):
+        V, F = beast(overhang, legs)
+        V = V * [ahead, 1, 1]
+        tail = np.where(V[:, 0] * ahead < -0.4, 1.0, 0.0) * np.linspace(0.5, 1, len(V))
+        seen = facing(unit_size(V, F), F, tail, plane, axes)
+        assert (seen.front[0] * ahead > 0.99) == told and (not told or seen.certainty >= FIGURE)
 
 
 def test_a_published_figure_looks_where_its_face_is_wherever_it_is_seen_from():
