@@ -3,51 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
-from ..maps.development import unrolled
 from ..mesh.charts import Chart
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import COMPACT, SPREAD_BY_SHEAR
-from .chart_indices import but_within, edge_set, identity, is_marked
-from .chart_map import ChartMap, local_shear
+from .chart_indices import but_within, edge_set, is_marked
+from .chart_map import ChartMap
 from .mirrored_charts import mapped_anew
+from .pieces import come_apart
 from .shear_search import (
     MARGIN,
-    MOST_STEEP,
     NEARLY,
     NO_EDGES,
     NO_EXCESS,
-    STEEP,
     UNSHEARED,
     Round,
     ShearSearch,
     joined,
-    pressing_shear,
 )
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
 # After so many rounds one that is hardly better than the one before is the last.
 TRIED = 2
-# What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
-CROWDED = 1.35
-# After a second search, what lies on itself comes apart where that leaves this share of what is missing at most.
-ROOM = 0.5
-# Nothing comes apart for less than this share of the bound.
-HARDLY = 0.01
-# So many times what is steep beyond that share is slit, and this share of a chart more every time that was no help.
-SLIT = 1.5
-MORE_SLIT = 0.001
-# What misses the bound by little after a second search is slit where it shears more than this.
-SHEARED = 2.0
-# What is steep alone is slit so many times before it may come apart.
-SLIT_AT_FIRST = 2
 # A shorter cut is mapped where all are shorter by this share at least.
 WORTHWHILE = 0.03
 # Where that misses the bound, one that uses up less of what is allowed may not: powers of it.
@@ -165,7 +149,7 @@ def _further_rounds(
             if not spared.searched:
                 return spared
         is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
-        parting = part_of(_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
+        parting = part_of(come_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
         parts = yield from unless_ended(parting, early)
         if parts is None or (is_stuck and not parts[0]):
             break
@@ -358,83 +342,6 @@ def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd)
     good = (np.bincount(of, minlength=count) == 1) & (np.bincount(of, new.pressing > new.bound, count) == 0)
     stay = ~(good & (np.bincount(of, new.outline_price, count) < (1 - EVEN) * last.outline_price))
     return last if stay.all() else last.merged(search, new, of, stay)
-
-
-def _apart(
-    search: ShearSearch,
-    last: Round,
-    crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None,
-    rounds: int,
-    worse: set[tuple[bytes, bytes]],
-) -> Steps[tuple[dict[int, np.ndarray], list[int], bool]]:
-    """Edges (e,2), by the number of a chart, that part it around its flat sides, or where it lies in its own way, or
-    slit it; the numbers of those with flat sides, which need no other cuts; and whether any lies in its own way.
-
-    worse : the identities of charts whose parts were worse than they are
-    """
-    found: dict[int, np.ndarray] = {}
-    flat, crossed = list[int](), False
-    late = rounds > 1 or any(found.gave_up for found in last.memory.values())
-    # What has no map is cut further, and nothing else helps.
-    chosen = [k for k in last.searched if last.maps[k].failure is None]
-    if not chosen:
-        return found, flat, crossed
-    from ..seams.parting import flat_sides  # Hardly any chart misses its bound.
-
-    for k in chosen:
-        mean, whole = last.mean[k], identity(last.charts[k]) in worse
-        stays = whole or mean <= last.bound or last.is_cut_further(rounds)
-        edges = np.zeros((0, 2), np.int64) if stays else flat_sides(last.charts[k])
-        if len(edges):
-            flat.append(k)
-        elif crossing is not None and not whole and _may_cross(last, k, late, rounds):
-            # From a sheared map on it is a long way to where what is flat lies on itself.
-            uv = unrolled(last.charts[k].vertices, last.charts[k].triangles)
-            uv = (yield from crossing(last.charts[k], last.maps[k])) if uv is None else uv
-            edges = _uncrossed(search, last, k, uv, late)
-            crossed |= len(edges) > 0
-        if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
-            # No other cut is needed, but one into what shears that much.
-            edges = _slit(search, last, k, rounds)
-        found |= {k: edges} if len(edges) else {}
-    return found, flat, crossed
-
-
-def _may_cross(last: Round, k: int, late: bool, rounds: int) -> bool:
-    """Whether chart k misses the bound by so much that it may lie in its own way, or was slit in vain."""
-    missed = last.mean[k] > (1 + HARDLY) * last.bound
-    much = np.log(last.mean[k]) >= np.sqrt(CROWDED) * np.log(last.bound)
-    return rounds > SLIT_AT_FIRST or bool(missed and (late or much))
-
-
-def _uncrossed(search: ShearSearch, last: Round, k: int, uv: np.ndarray, late: bool) -> np.ndarray:
-    """Edges (e,2) that part chart k between what lies on itself in a map uv (n,2) that may, where that is what it
-    misses the bound for."""
-    from ..seams.parting import parted
-
-    chart, mean = last.charts[k], last.mean[k]
-    shear, area = local_shear(chart, replace(last.maps[k], uv=uv), search.target is None)
-    both = float(area @ shear / area.sum()), float(area[shear > STEEP].sum() / area.sum())
-    mild = mean <= last.bound
-    missed, without = (last.pressing[k], pressing_shear(*both, last.bound)) if mild else (mean, both[0])
-    if without > last.bound + late * ROOM * (missed - last.bound):
-        return np.zeros((0, 2), np.int64)
-    return parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
-
-
-def _slit(search: ShearSearch, last: Round, k: int, rounds: int) -> np.ndarray:
-    """Edges (e,2) from the seams around chart k into what is steep, or, where its mean misses the bound, sheared; more
-    than the last time."""
-    from ..seams.parting import slits
-
-    chart = last.charts[k]
-    shear, area = local_shear(chart, last.maps[k], search.target is None)
-    missed = max(last.mean[k] / last.bound - 1, 0.0)
-    steep = shear > (STEEP if missed == 0 else SHEARED)
-    excess = float(area[steep].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
-    costs, here = search.costs(), chart.vertex_ids
-    least, barred = (SLIT * excess + MORE_SLIT * (rounds - 1)) * area.sum(), costs.in_face[here]
-    return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images, rounds)
 
 
 def _result(last: Round, search: ShearSearch, warnings: tuple[str, ...], early: EarlyEnd) -> BoundedShear:

@@ -300,7 +300,7 @@ def test_slits_within_charts_are_known_to_later_rounds():
     ],
 )
 def test_charts_may_cross_themselves_where_they_miss_the_bound_by_much_or_late(mean, late, rounds, may):
-    assert shear_bound._may_cross(round_of([1], [mean]), 0, late, rounds) == may
+    assert pieces._may_cross(round_of([1], [mean]), 0, late, rounds) == may
 
 
 @pytest.mark.parametrize(

@@ -273,7 +273,7 @@ def test_what_stays_steep_after_slits_comes_apart_where_it_lies_in_its_own_way(r
 
     steep = local_shear(chart, chart_map, True)[0] > shear_search.STEEP
     assert area[steep].sum() > 0.01 * area.sum()
-    found, flat_sides, crossed = drain(shear_bound._apart(search, last, crossing, rounds, set()))
+    found, flat_sides, crossed = drain(pieces.come_apart(search, last, crossing, rounds, set()))
     parts = strict_charts(triangle_surface(V, F, found.get(0, np.zeros((0, 2), int))))
     assert not flat_sides and crossed == comes_apart and len(parts) == (2 if comes_apart else 1)
 
@@ -418,7 +418,7 @@ def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, thinned
     assert before.searched == [0]
     search.thinned.extend(before.charts[k].faces for k in thinned)
     monkeypatch.setattr(shear_bound, "_first_round", lambda *_: worked(before))
-    monkeypatch.setattr(shear_bound, "_apart", lambda _, last, *__: worked(seen.append(last.settled)))
+    monkeypatch.setattr(shear_bound, "come_apart", lambda _, last, *__: worked(seen.append(last.settled)))
     monkeypatch.setattr(shear_bound, "_made_shorter", lambda _, best, *__: worked(best))
     drain(shear_bound.bound_shear(search, SimpleNamespace(warnings=()), [], None, of_pieces=of_pieces))
     assert sorted(seen[0]) == (sorted(within(before.charts[0])) if settled else [])

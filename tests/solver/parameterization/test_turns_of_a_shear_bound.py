@@ -115,7 +115,7 @@ def bounded(monkeypatch):
         monkeypatch.setattr(shear_bound, "unless_ended", lambda steps, early: steps)
         monkeypatch.setattr(shear_bound, "edge_set", lambda edges: edges)
         monkeypatch.setattr(shear_bound, "_first_round", first)
-        monkeypatch.setattr(shear_bound, "_apart", parting)
+        monkeypatch.setattr(shear_bound, "come_apart", parting)
         monkeypatch.setattr(shear_bound.Asked, "of", staticmethod(of))
         monkeypatch.setattr(shear_bound, "_cut_anew", anew)
         monkeypatch.setattr(shear_bound, "_with_areas_spared", spare)
