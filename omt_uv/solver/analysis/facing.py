@@ -153,19 +153,19 @@ def _told_by_shape(
     used = positions[triangles].reshape(-1, 3)
     there = unit(np.cross(up, plane.normal))
     there = there if there @ viewer >= 0 else -there
-    depth = np.ptp(used @ there) / np.ptp(used @ up)
-    if depth > 1:
+    height, depth = np.ptp(used @ up), np.ptp(used @ there)
+    if depth > height:
         ahead_of = _overhangs(positions, triangles, plane, there, up)
         return ahead_of * there if ahead_of else None
     seen = there @ viewer > 1 - LEANING and off @ there >= 0
-    if depth < LONG and _legs(positions, triangles, plane, -up, LEGS) > 0:
+    if depth < LONG * height and _legs(positions, triangles, plane, -up, LEGS) > 0:
         here, behind = _salient_views(
             positions, triangles, saliency, plane, np.stack([there, -there]), _on_top(positions, triangles, up)
         )
         if behind > FACE * here:
             return -there
         return there if here > FACE * behind or seen else None
-    return there if depth < LOW and seen else None
+    return there if depth < LOW * height and seen else None
 
 
 def _overhangs(

@@ -16,7 +16,7 @@ from ..seams.options import COMPACT, SPREAD_BY_SHEAR
 from .chart_indices import but_within, edge_set, is_marked
 from .chart_map import ChartMap
 from .mirrored_charts import mapped_anew
-from .pieces import come_apart
+from .pieces import come_apart, in_halves
 from .shear_search import (
     MARGIN,
     NEARLY,
@@ -244,10 +244,21 @@ def _along_all_creases(search: ShearSearch, last: Round, map_charts, early: Earl
     return last if new is None or new.excess >= last.excess else new
 
 
+def _in_halves(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
+    """A round that misses its bound, or where it misses it by less one whose charts come apart in halves."""
+
+    def cut(last: Round, charts: list[int], kept: np.ndarray) -> Steps[Round | None]:
+        asked = Asked(charts, kept, search.first_spread(), {}, lambda edges: True)
+        return _cut_anew(search, last, asked, map_charts, early)
+
+    return (yield from in_halves(search, last, cut))
+
+
 def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, early: EarlyEnd) -> Steps[Round]:
     """The last round with areas spared where it misses the bound, and with shorter cuts where it does not."""
     if last.excess > NEARLY * last.bound:
         last = yield from part_of(_along_all_creases(search, last, map_charts, early), 0.0, 0.0)
+        last = yield from part_of(_in_halves(search, last, map_charts, early), 0.0, 0.0)
     if last.excess:
         return (yield from _with_areas_spared(search, last, map_sparing, early))
     last = yield from part_of(_taken_back(search, last, map_charts, early), 0.0, 0.4)

@@ -40,6 +40,8 @@ LEAST_PART = 0.03
 MOST_SLITS = 4
 # What has less than this share of what is to be slit comes last, however near it is.
 LITTLE = 0.05
+# Each half of a chart has this share of it at least.
+LEAST_HALF = 0.25
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
 # The image of a part whose vertices have none ends within this share of the side of a square with its area of where
@@ -141,6 +143,25 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, images: MirrorImages 
     if images is not None:
         cut = with_images(chart, graph, cut, images, sides, capacity)
     return chart.vertex_ids[graph.ends[cut]]
+
+
+def halves(chart: Chart, cost: np.ndarray) -> np.ndarray:
+    """Edges (k,2) of the surface along which what a chart covers comes apart in two, between what lies farthest from
+    one another, across its seams, too.
+
+    cost (v,): of a cut through the vertices of the surface, per length. No edges where it has one polygon.
+    """
+    graph, positions = PolygonGraph.of(chart, glued=True), _of_surface(chart)
+    length = edge_lengths(positions, graph.ends)
+    steps, ends = graph.matrix(length + 1e-300), [0]
+    for _ in range(2):
+        far = dijkstra(steps, indices=ends[-1])
+        ends.append(int(np.where(np.isfinite(far), far, -1).argmax()))
+    if ends[1] == ends[2]:
+        return np.zeros((0, 2), np.int64)
+    grown = _enlarged(graph, steps, np.array(ends[1:2]), np.array(ends[2:]), LEAST_HALF)
+    side = minimum_cut(graph, capacities(cost[graph.ends].mean(axis=1) * length), *grown)
+    return graph.ends[graph.around(side)]
 
 
 def with_images(
@@ -401,16 +422,16 @@ def _in_rows(rows: int) -> np.ndarray:
 
 
 def _enlarged(
-    graph: PolygonGraph, steps: csr_matrix, one: np.ndarray, other: np.ndarray
+    graph: PolygonGraph, steps: csr_matrix, one: np.ndarray, other: np.ndarray, share: float = LEAST_PART
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Both pieces with what lies around them, as large as an island should be at least."""
+    """Both pieces with what lies around them, with that share of the area: as large as an island should be at least."""
     far = np.stack([dijkstra(steps, indices=piece, min_only=True) for piece in (one, other)])
     nearer = np.argmin(far, axis=0)
     grown = []
     for k, piece in enumerate((one, other)):
         around = np.flatnonzero((nearer == k) & np.isfinite(far[k]))
         around = around[np.argsort(far[k][around], kind="stable")]
-        enough = np.cumsum(graph.area[around]) <= LEAST_PART * graph.area.sum()
+        enough = np.cumsum(graph.area[around]) <= share * graph.area.sum()
         grown.append(np.union1d(piece, around[enough]))
     return grown[0], np.setdiff1d(grown[1], grown[0])
 

@@ -11,6 +11,7 @@ from omt_uv.solver.analysis.facing import (
     UNSURE,
     SceneAxes,
     _on_top,
+    _told_by_shape,
     facing,
     standing,
     towards,
@@ -146,6 +147,9 @@ def test_what_is_higher_than_deep_looks_at_the_viewer_if_nothing_speaks_against_
     assert facing(unit_size(V * [0.8, 0.5, 1], F), F, away, plane, axes).front @ axes.viewer < -0.99
     aside = facing(unit_size(V * [0.8, 0.5, 1], F), F, none, plane, SceneAxes(axes.up, (0.0, side, 0.0)))
     assert aside.certainty < FIGURE
+    # What lies level has no height at all.
+    with np.errstate(all="raise"):
+        assert _told_by_shape(V * [1, 0.5, 0], F, none, plane, axes, np.zeros(3)) is None
 
 
 def beast(overhang, legs=0.4):

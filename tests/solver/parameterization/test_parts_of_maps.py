@@ -33,6 +33,7 @@ from omt_uv.solver.parameterization.polygons import convexity, polygon_disk
 from omt_uv.solver.progress import EarlyEnd, RunLog, drain
 from omt_uv.solver.refinement import batch_refine
 from omt_uv.solver.refinement.vertex_sweeps import smoothed_uv
+from omt_uv.solver.seams import parting
 
 
 def chart_of(V, F, faces=None, ids=None):
@@ -342,13 +343,20 @@ def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
     [
         (1.2, ["_taken_back", "_parts_cut_anew", "_straightened"]),
         (1.38, ["_with_areas_spared"]),
-        (1.5, ["_along_all_creases", "_with_areas_spared"]),
+        (1.5, ["_along_all_creases", "_in_halves", "_with_areas_spared"]),
     ],
 )
 def test_a_round_is_made_shorter_only_within_the_bound(shear, asked, monkeypatch):
     """What misses it by much comes apart before areas are spared."""
     calls = []
-    for name in ("_along_all_creases", "_with_areas_spared", "_taken_back", "_parts_cut_anew", "_straightened"):
+    for name in (
+        "_along_all_creases",
+        "_in_halves",
+        "_with_areas_spared",
+        "_taken_back",
+        "_parts_cut_anew",
+        "_straightened",
+    ):
 
         def steps(search, last, *_, name=name):
             calls.append(name)
@@ -374,6 +382,38 @@ def test_what_misses_its_bound_comes_apart_along_all_creases_where_that_helps(af
     assert found is (new if taken else last)
     assert (asked[0].charts, asked[0].kept, asked[0].spread) == ([0, 2], ("kept", 0, 2), "spread")
     assert asked[0].changes == {"as_drawn": True} and asked[0].is_worth(last.cuts)
+
+
+@pytest.mark.parametrize(
+    ("after", "taken"),
+    [
+        ([None], 0),
+        ([1.6], 0),
+        ([1.49], 0),
+        ([1.4, 1.6], 1),
+        ([1.4, 1.36], 2),
+        ([1.45, 1.42, 1.395, 1.3], 3),
+        ([1.3], 1),
+    ],
+)
+def test_what_misses_its_bound_by_much_comes_apart_in_halves_as_often_as_that_helps(after, taken, monkeypatch):
+    """What is not much better is no help."""
+    rounds = [round_of([1, 1, 1], [1.5, 1.2, 1.36])]
+    rounds += [None if mean is None else round_of([1, 1, 1], [mean, 1.2, 1.36]) for mean in after]
+    asked, made = [], iter(rounds[1:])
+
+    def cut_anew(search, last, task, *_):
+        asked.append(task)
+        return next(made)
+        yield
+
+    monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
+    monkeypatch.setattr(parting, "halves", lambda chart, cost: np.array([[chart.faces[0], cost]]))
+    monkeypatch.setattr(shear_bound.Round, "kept", lambda self, chosen: np.array([[7, 8]]))
+    search = SimpleNamespace(first_spread=lambda: "spread", costs=lambda: SimpleNamespace(vertex_cost=9))
+    assert drain(shear_bound._in_halves(search, rounds[0], None, EarlyEnd())) is rounds[taken]
+    assert asked[0].charts == [0] and asked[0].kept.tolist() == [[7, 8], [0, 9]] and asked[0].spread == "spread"
+    assert asked[0].changes == {} and asked[0].is_worth(rounds[0].cuts)
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,12 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.seams.parting import (
+    LEAST_HALF,
     LEAST_PART,
     MOST_SLITS,
     PolygonGraph,
     flat_sides,
+    halves,
     parted,
     slits,
     with_images,
@@ -108,6 +110,35 @@ def test_the_image_of_what_comes_off_comes_off_too_however_small(size, flipped):
     area = np.sort(np.bincount(graph.pieces(~both), graph.area))
     assert len(area) == 3 and area[1] == pytest.approx(area[0], rel=0.3 if flipped else 1e-9)
     assert area[0] == pytest.approx(graph.area[apart].sum(), rel=0.3) and both[cut].all()
+
+
+@pytest.mark.parametrize("seamed", [False, True])
+def test_halves_come_apart_where_that_is_cheap_and_across_the_seams(seamed):
+    V, F, _ = ramp(0.9, steps=91)
+    along = np.arange(90) * 6
+    seams = np.stack([along + 3, along + 9], axis=1)[20:] if seamed else np.zeros((0, 2), np.int64)
+    (chart,) = strict_charts(triangle_surface(V, F, seams))
+    turn = V[:, 2] / 0.18
+    for cheap in (0.3, 0.7):
+        edges = halves(chart, np.where(np.abs(turn - cheap) < 0.02, 0.1, 1.0))
+        parts = strict_charts(triangle_surface(V, F, edges))
+        share = [face_areas(part.vertices, part.triangles).sum() for part in parts] / face_areas(V, F).sum()
+        assert len(parts) == 2 and min(share) >= LEAST_HALF
+        assert len(edges) == 5 and (np.abs(turn[edges] - cheap) < 0.03).all()
+
+
+def test_halves_have_their_share_though_less_would_be_cheaper():
+    V, F, _ = ramp(0.9, steps=91)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    edges = halves(chart, np.where(V[:, 2] / 0.18 < 0.1, 1e-3, 1.0))
+    parts = strict_charts(triangle_surface(V, F, edges))
+    assert (
+        min(face_areas(part.vertices, part.triangles).sum() for part in parts)
+        > 0.9 * LEAST_HALF * face_areas(V, F).sum()
+    )
+    # What is one polygon has none.
+    (single,) = strict_charts(triangle_surface(V[[0, 1, 6]], np.array([[0, 1, 2]])))
+    assert halves(single, np.ones(3)).shape == (0, 2)
 
 
 def test_what_lies_beside_itself_stays_whole():
