@@ -237,6 +237,7 @@ def test_enter_keeps_the_best_so_far_and_escape_restores_everything(package, mon
     assert any("seams were done" in notice.text for notice in summary.notices)
     kept = scenes.uv_of(obj)
     monkeypatch.setattr(package("solver.parameterization.shear_bound"), "MOST_ROUNDS", 1)
+    monkeypatch.setattr(package("solver.parameterization.pieces"), "MOST_HALVINGS", 0)
     assert bpy.ops.uv.omt_unwrap(max_shear=1.02) == {"FINISHED"}
     assert np.array_equal(scenes.uv_of(obj), kept)
 
