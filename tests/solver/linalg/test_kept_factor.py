@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from work import counted_work
 
 from omt_uv.solver.errors import PrecisionError
-from omt_uv.solver.linalg.additive_schwarz import FEW, RENEWED, AdditiveSchwarz
+from omt_uv.solver.linalg.additive_schwarz import FEW, MOST_KEPT, RENEWED, AdditiveSchwarz
 from omt_uv.solver.linalg.kept_factor import KEPT_ENOUGH, WINDOW, KeptFactor, by_gradients
 
 
@@ -94,10 +94,22 @@ def test_parts_whose_factors_will_not_do_take_steps_and_new_ones_some_at_a_time(
         factored.append(work.factorisations)
         assert b @ x > 0
         falls.append(fall(far, b, x) / fall(far, b, exact))
-    # None for the first, some for each of the next until all are new, and then no more.
+    # None for the first, some for each of the next until all are new, and then no more. The second has iterations too
+    # few by some that are new: all are asked for once more.
     every = len(parts._kept.groups) + 1
-    assert factored == [0, RENEWED, RENEWED, every - 2 * RENEWED, 0, 0] and every > 2 * RENEWED
+    assert factored == [0, RENEWED, RENEWED, RENEWED, every - 2 * RENEWED, 0] and every > 2 * RENEWED
     assert 0 < falls[0] < falls[-1] and falls[-1] >= 1 - KEPT_ENOUGH
+
+
+def test_a_step_with_new_factors_has_iterations_less(systems):
+    V, F, first, _, other, b = systems
+    w, axes = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1))
+    far = other + sp.diags(np.geomspace(1, 1e6, len(b)) * other.diagonal())
+    parts = AdditiveSchwarz(V, F, 200, True)
+    parts.solve(first, b, w, lambda: axes)
+    for most in (MOST_KEPT, MOST_KEPT - RENEWED):
+        parts.solve(far, b, w, lambda: axes)
+        assert parts._kept.most == most and parts._kept.calls <= most + 1
 
 
 def test_new_factors_are_as_good_as_those_of_a_first_matrix(systems):
