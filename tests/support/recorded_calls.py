@@ -129,7 +129,8 @@ def _fewer(leaf: np.ndarray) -> np.ndarray:
     many = 1 + flat.size // SAMPLED
     if many == 1:
         return flat
-    return np.add.reduceat(np.nan_to_num(flat.astype(complex)), np.arange(0, flat.size, many))
+    with np.errstate(over="ignore"):
+        return np.add.reduceat(np.nan_to_num(flat.astype(complex)), np.arange(0, flat.size, many))
 
 
 def _kind(leaf: np.ndarray) -> float:
