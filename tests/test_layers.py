@@ -60,7 +60,8 @@ ARROWS: dict[str, str] = {
     "solver.remeshing.components": "solver solver.mesh solver.analysis",
     "solver.remeshing.edits": "solver solver.mesh solver.remeshing.components",
     "solver.remeshing.relaxation": "solver solver.mesh solver.linalg solver.remeshing.edits",
-    "solver.remeshing.fitting": "solver solver.mesh solver.linalg solver.remeshing.edits solver.remeshing.relaxation",
+    "solver.remeshing.fitting": "solver solver.mesh solver.linalg solver.contact solver.remeshing.edits "
+    "solver.remeshing.relaxation",
     "solver.remeshing.initial": "solver solver.mesh solver.maps solver.transport solver.cutting solver.conformal "
     "solver.refinement solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "

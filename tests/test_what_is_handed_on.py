@@ -95,3 +95,33 @@ def test_what_is_left_out_with_a_reason_is_left_out():
     for function, made, missing in left_out():
         found.setdefault((function, made), set()).update(missing)
     assert {key: set(names) for key, (names, _) in LEFT_OUT.items()} == {k: v for k, v in found.items() if v}
+
+
+def _mentions(function: ast.FunctionDef, name: str) -> bool:
+    """Whether a function hands on the warnings of a parameter, or all of it."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Attribute) and node.attr == "warnings" and ast.unparse(node.value) == name:
+            return True
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "replace" and ast.unparse(node.args[0]) == name:
+            return True
+    return False
+
+
+def silent() -> Iterator[tuple[str, str, str]]:
+    """Function, class that it makes with warnings of its own, and a parameter that has some, of which it takes none."""
+    for tree in TREES.values():
+        for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
+            every = [*function.args.args, *function.args.kwonlyargs]
+            kinds = {a.arg: ast.unparse(a.annotation).partition(" |")[0] for a in every if a.annotation}
+            of = [n for n, kind in kinds.items() if kind in CLASSES and "warnings" in fields_of(kind)]
+            for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+                if not isinstance(call.func, ast.Name) or call.func.id not in CLASSES:
+                    continue
+                told = given(call, function).get("warnings")
+                # Who is given all warnings leaves to its caller whose they are.
+                if told is not None and ast.unparse(told) not in {a.arg for a in every}:
+                    yield from ((function.name, call.func.id, n) for n in of if not _mentions(function, n))
+
+
+def test_warnings_of_what_something_is_made_of_are_handed_on():
+    assert list(silent()) == []

@@ -152,3 +152,14 @@ def test_shells_and_points_of_a_body_are_as_many_as_asked_and_inside(package, co
     assert len(dots.data.vertices) == 5 * count and not dots.data.polygons and dots.name == "Body Points"
     at = np.array([v.co[:] for v in dots.data.vertices])
     assert (at > -1e-6).all() and (at.sum(axis=1) < 1 + 1e-6).all()
+
+
+def test_places_that_are_written_are_those_of_the_vertices_in_the_domain(package):
+    """Not those in the ball, which are others where the domain is a body."""
+    tets, obj = package("blender.volumes.tet_objects"), scenes.cube()
+    rng = np.random.default_rng(4)
+    found = SimpleNamespace(surface=rng.random((8, 3)), ball=rng.random((12, 3)), map=None)
+    tets.write_places(obj, found)
+    values = np.zeros(24, np.float32)
+    obj.data.attributes[tets.PLACES].data.foreach_get("vector", values)
+    np.testing.assert_allclose(values.reshape(8, 3), found.surface, rtol=1e-6)

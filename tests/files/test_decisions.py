@@ -92,13 +92,17 @@ def test_vertices_are_split_by_formats_with_one_uv_for_each(package, suffix, lay
 
 
 def test_faces_are_the_same_where_all_their_corners_are(package):
-    same = package("commands.shapes.average")._same_faces
+    same = package("pipelines.shapes.strain").same_polygons
 
     def surface(n=4, corners=(0, 1, 2, 3), start=(0, 4)):
         return SimpleNamespace(positions=np.zeros((n, 3)), corner_vertex=np.array(corners), face_start=np.array(start))
 
     assert same(surface(), surface())
     assert not same(surface(), surface(5)) and not same(surface(), surface(corners=(0, 1, 3, 2)))
+    assert same(surface(), surface(corners=(2, 3, 0, 1))) and same(surface(0, (), (0,)), surface(0, (), (0,)))
+    two = (0, 1, 2, 3, 2, 1, 0), (0, 3, 3, 7)
+    assert same(surface(4, *two), surface(4, (2, 0, 1, 0, 3, 2, 1), two[1]))
+    assert not same(surface(4, *two), surface(4, (2, 0, 1, 0, 3, 1, 2), two[1]))
     assert not same(surface(), surface(start=(0, 3, 4))) and not same(surface(), surface(corners=(0, 1, 2)))
 
 

@@ -180,6 +180,18 @@ def test_densities_are_pixels_for_every_length(said, unit, metres, scale):
     assert told == pytest.approx([density, 512], rel=1e-3)
 
 
+@pytest.mark.parametrize("unit", ["CM", "M", "IN"])
+def test_a_density_that_was_measured_is_set_in_the_unit_and_for_the_texture_that_it_was_measured_in(said, unit):
+    plain.two_patches()
+    told, _ = said("uv.omt_density_get", unit=unit, texture_size=640)
+    taken = bpy.context.window_manager.operator_properties_last("uv.omt_density_set")
+    assert (taken.unit, taken.texture_size) == (unit, 640) and taken.density == pytest.approx(told[0], rel=1e-3)
+    given = {name: getattr(taken, name) for name in ("density", "unit", "texture_size")}
+    assert bpy.ops.uv.omt_density_set(**{**given, "density": 3 * taken.density}) == {"FINISHED"}
+    again, _ = said("uv.omt_density_get", unit=unit, texture_size=640)
+    assert again[0] == pytest.approx(3 * told[0], rel=1e-3)
+
+
 def test_cells_are_counted_and_their_areas_are_equal(said):
     found = spheres(1, 1)
     told, rows = said("mesh.omt_partition", cells=5, write="ATTRIBUTE")

@@ -678,3 +678,19 @@ def test_arrays_of_vtk_name_their_type_and_their_width():
         '<DataArray type="Int64" Name="a" format="ascii">\n1 2 3 4\n</DataArray>\n'
     )
     assert 'NumberOfComponents="3"' in _array("a", np.zeros((1, 3)), "Float64", 3)
+
+
+@pytest.mark.parametrize("figure", ["AREA", "SHEAR", "FOLDS"])
+@pytest.mark.parametrize("place", [0, 3, 8])
+def test_faces_without_area_change_nothing_of_which_faces_are_worst(figure, place):
+    """But for their own numbers: one that lies before others moves these by one."""
+    V, F = meshes.grid(3, 3)
+    moved = V[:, :2] * [1, 1.3]
+    moved[5] += [0.5, 0.3]
+    uv = moved[F]
+    (plain,) = worst_faces([reading(V, F, uv.reshape(-1, 2))], figure, 0.3)
+    flat = np.insert(F, place, [F[0, 0], F[0, 1], len(V)], axis=0)
+    W = np.concatenate([V, V[F[0, :1]]])
+    beside = np.insert(uv, place, uv[0, [0, 1, 0]], axis=0)
+    (found,) = worst_faces([reading(W, flat, beside.reshape(-1, 2))], figure, 0.3)
+    assert [k - (k > place) for k in found.tolist() if k != place] == plain.tolist() and len(plain)

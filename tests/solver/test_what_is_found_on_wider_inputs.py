@@ -1,10 +1,11 @@
 """What every function of the solver finds, private ones, too, on meshes of more kinds and sizes than `solver_runs` has.
 
 As `test_what_holds_of_every_function`, whose table has public functions on small meshes alone: `found_wider.tsv` has
-three figures of what each function finds in its first calls of every run of `wider_runs` and `seldom_runs`, and of
-private ones in those of `solver_runs`. So a bound or a weight within a function, and a branch that is taken from a size
-on, is seen by what it changes. OMT_UV_ACCEPT=1 writes the table anew, without what the last digits of the input decide;
-OMT_UV_ACCEPT=fewer leaves out what does not hold here, to be called once with every OPENBLAS_CORETYPE.
+three figures of what each function finds in its first calls of every run of `wider_runs`, `seldom_runs` and
+`rare_runs`, and of private ones in those of `solver_runs`. So a bound or a weight within a function, and a branch that
+is taken from a size on, is seen by what it changes. OMT_UV_ACCEPT=1 writes the table anew, without what the last digits
+of the input decide; OMT_UV_ACCEPT=fewer leaves out what does not hold here, to be called once with every
+OPENBLAS_CORETYPE.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 
 import meshes
 import numpy as np
+import rare_runs
 import recorded_calls
 import seldom_runs
 import solver_runs
@@ -35,6 +37,8 @@ LEFT_OUT = ("compared", "new_meshes")
 SMALL = " on small meshes"
 # What stands behind names in runs of `seldom_runs`.
 SELDOM = " seldom"
+# What stands behind names of runs of `rare_runs`.
+RARE = " rarely"
 # Least share of the functions of the solver that are to be seen.
 MOST_OF_ALL = 0.85
 
@@ -50,7 +54,7 @@ def told():
     _forget()
     record = recorded_calls.Told(MOST)
     everything = [*recorded_calls.modules(), solver]
-    watched = recorded_calls.watching(record, everything, private=True, callers=(seldom_runs,))
+    watched = recorded_calls.watching(record, everything, private=True, callers=(seldom_runs, rare_runs))
     with watched, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name, run in wider_runs.RUNS.items():
@@ -58,6 +62,9 @@ def told():
             run()
         for name, run in seldom_runs.RUNS.items():
             record.next_run(SELDOM + " of symmetric meshes" * (name in seldom_runs.SYMMETRIC))
+            run()
+        for name, run in rare_runs.RUNS.items():
+            record.next_run(RARE + " of symmetric meshes" * (name in rare_runs.SYMMETRIC))
             run()
         for name, run in solver_runs.RUNS.items():
             if name not in LEFT_OUT:
@@ -91,13 +98,15 @@ def shaken(seed, monkeypatch):
         for module, names in (
             (wider_runs, ("bent", "curved", "wavy_quads", "wavy_mixed", "with_limbs", "broken_mesh")),
             (seldom_runs, ("bent",)),
+            (rare_runs, ("bent", "curved", "patch", "wavy_quads", "wavy_mixed", "with_limbs", "ridge")),
             (solver_runs, ("patch", "body")),
         ):
             for name in names:
                 patch.setattr(module, name, _shaking(seed, getattr(module, name)))
-        names = ("two_bumps", "torus", "polar", "icosphere")
+        names = ("two_bumps", "torus", "polar", "icosphere", "bumpy", "comb", "annulus")
         others = {name: _shaking(seed, getattr(meshes, name)) for name in names}
-        patch.setattr(wider_runs, "meshes", types.SimpleNamespace(**{**vars(meshes), **others}))
+        for module in (wider_runs, rare_runs):
+            patch.setattr(module, "meshes", types.SimpleNamespace(**{**vars(meshes), **others}))
         figures = told()
     _forget()
     return figures

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import itertools
 import sys
 from types import SimpleNamespace
 
@@ -49,10 +51,17 @@ def in_front(monkeypatch, package) -> None:
 
 
 def in_single_steps(monkeypatch, package) -> None:
-    """Let a slice of a run be one step of it."""
-    run = package("session.run")
-    monkeypatch.setattr(run.Run.advance, "__defaults__", (0.0,))
+    """Let a slice of a run, and of what follows a slider, be one step of it, and figures be shown after each: no clock
+    decides what comes of it. Both may be watched by `recorded_calls`."""
+    run, live = package("session.run"), package("session.live")
+    for function in (run.Run.advance, live.Session.follow):
+        monkeypatch.setattr(inspect.unwrap(function), "__defaults__", (0.0,))
     monkeypatch.setattr(run, "threads", False)
+    monkeypatch.setattr(package("operators.live"), "LOOK_EVERY", -1.0)
+    # A queue looks at the clock before each step: every second time its slice is over.
+    ticks = itertools.count()
+    clock = SimpleNamespace(monotonic=lambda: 0.6 * run.SLICE * next(ticks))
+    monkeypatch.setattr(package("operators.arranging.queue"), "time", clock)
 
 
 def event(kind, value="PRESS", at=(0, 0)):

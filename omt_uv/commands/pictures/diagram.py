@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from ...settings import DOMAINS
+from ...solver.errors import plural
 from ..common import CommandError, check_paths, drain_shown, refusals, require_blender, warn, write_picture
 from ..options import add_input, names, texture_size
 from ..selection import read_file
@@ -36,9 +37,12 @@ def run(options: argparse.Namespace) -> None:
     check_paths(options, [])
     pairs = read_file(options)
     obj, reading = max(pairs, key=lambda pair: len(pair[1].surface.triangles))
+    told = [] if len(pairs) == 1 else [_left_out(obj.name, len(pairs) - 1)]
+    if told and options.strict:
+        raise CommandError(f"{options.input}: {told[0]}. Nothing was written, as --strict asks.")
     with refusals(name=obj.name):
         found = drain_shown(diagram(reading.surface, reading.faces, options.domain))
-    warn([obj], [(0, text) for text in found.warnings], [])
+    warn([obj], [(0, text) for text in found.warnings], told)
     if ending == ".png":
         from ...display.textures.layouts import cells_picture
 
@@ -47,6 +51,12 @@ def run(options: argparse.Namespace) -> None:
         write_bytes(options.made, obj_text(*found.mesh()).encode())
     if options.json:
         print(json.dumps(found.report()))
+
+
+def _left_out(name: str, count: int) -> str:
+    """What is told of other objects than the one of this name."""
+    others = plural(count, "another object is", "{} other objects are")
+    return f"The diagram is that of {name}, which has most triangles; {others} left out: name one by --object"
 
 
 def obj_text(vertices, polygons) -> str:

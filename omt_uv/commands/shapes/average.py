@@ -90,6 +90,7 @@ def _registered(options: argparse.Namespace, files: list[Path]):
     """All shapes with the vertices of the first, its surface, and its polygons."""
     from ...pipelines.shapes.landmark_pairs import pairs_of
     from ...pipelines.shapes.match import MatchJob
+    from ...pipelines.shapes.strain import same_polygons
     from ...pipelines.shapes.wrap import wrap_surfaces
     from ...solver.registration.results import RegistrationOptions
 
@@ -101,7 +102,7 @@ def _registered(options: argparse.Namespace, files: list[Path]):
             polygons = [list(polygon.vertices) for polygon in obj.data.polygons]
             shapes.append(Registered(path, obj.name, surface.positions, False))
             continue
-        if _same_faces(first, surface):
+        if same_polygons(first, surface):
             shapes.append(Registered(path, obj.name, surface.positions, False))
             continue
         with refusals(name=obj.name):
@@ -124,15 +125,6 @@ def _read(options: argparse.Namespace, path: Path):
         raise CommandError(f"{path}: it has several meshes: {every}. Join them, or name one by --object.")
     obj, reading = pairs[0]
     return obj, reading.surface, read_landmarks(obj, options.landmarks) if options.landmarks else []
-
-
-def _same_faces(first, other) -> bool:
-    """Whether two surfaces have the same polygons of the same vertices."""
-    import numpy as np
-
-    same = len(first.positions) == len(other.positions)
-    same = same and np.array_equal(first.corner_vertex, other.corner_vertex)
-    return bool(same and np.array_equal(first.face_start, other.face_start))
 
 
 def _write(options: argparse.Namespace, shapes: list[Registered], surface, polygons: list[list[int]]) -> None:

@@ -97,7 +97,8 @@ class UV_OT_omt_queue(bpy.types.Operator):
             _write(obj, stop.value)
             job.end("DONE")
         except Complaint as complaint:
-            job.end("FAILED", str(complaint))
+            # The job says whose it is.
+            job.end("FAILED", str(complaint).removeprefix(f"{job.name}: "))
         last_run.redraw(context)
         return {"RUNNING_MODAL"}
 

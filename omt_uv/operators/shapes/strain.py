@@ -51,6 +51,7 @@ class OBJECT_OT_omt_strain(QuickOperator, bpy.types.Operator):
         """What `strain_of` measures of an object."""
         from ...blender.mesh import read, stretch
         from ...blender.shapes.strain import key_shape
+        from ...pipelines.shapes.strain import same_polygons
 
         if self.of == "UV":
             if reading.uv is None:
@@ -58,9 +59,10 @@ class OBJECT_OT_omt_strain(QuickOperator, bpy.types.Operator):
             return {"uv": reading.uv}
         if self.of == "OBJECT":
             others = [o for o in context.selected_objects if o.type == "MESH" and o != obj]
-            if len(others) != 1 or len(others[0].data.loops) != len(obj.data.loops):
+            surface = read(others[0]).surface if len(others) == 1 else None
+            if surface is None or not same_polygons(reading.surface, surface):
                 raise Complaint("Select one other object with the same vertices and faces as the active one.")
-            return {"shape": read(others[0]).surface.positions}
+            return {"shape": surface.positions}
         name = self.shape_key or (obj.active_shape_key.name if obj.active_shape_key else "")
         shape = key_shape(obj.data, name) if name else None
         if shape is None:

@@ -51,9 +51,11 @@ def regions_of(surface: Surface, weights: dict[str, np.ndarray], materials: np.n
     """Regions as weights (m,) of the triangles: vertex groups by weights (n,), materials by slots (f,)."""
     triangles = surface.corner_vertex[surface.triangles]
     regions = {name: np.asarray(w, float)[triangles].mean(axis=1) for name, w in weights.items()}
-    slots = materials[surface.triangle_face]
     if len(names) > 1:
-        regions |= {f"material {name}": (slots == k).astype(float) for k, name in enumerate(names)}
+        # Slots beyond the last one are shown as that, and several may hold one material.
+        slots = np.minimum(materials[surface.triangle_face], len(names) - 1)
+        mine = np.array(names, dtype=object)[slots]
+        regions |= {f"material {name}": (mine == name).astype(float) for name in names}
     return regions
 
 
@@ -64,3 +66,22 @@ def strain_report(rows: list[RegionStrain]) -> list[dict]:
 
 def _row(row: RegionStrain) -> dict:
     return {**asdict(row), "histogram": row.histogram.round(6).tolist()}
+
+
+def same_polygons(first: Surface, other: Surface) -> bool:
+    """Whether two surfaces have the same polygons of the same vertices, each from whichever corner on, so that a vertex
+    of one is one of the other."""
+    return (
+        len(first.positions) == len(other.positions)
+        and len(first.corner_vertex) == len(other.corner_vertex)
+        and np.array_equal(first.face_start, other.face_start)
+        and np.array_equal(_from_the_least(first), _from_the_least(other))
+    )
+
+
+def _from_the_least(surface: Surface) -> np.ndarray:
+    """The vertices (c,) of corners, every polygon from the least of its vertices on."""
+    vertex, size = surface.corner_vertex, np.diff(surface.face_start)
+    owner, first = np.repeat(np.arange(len(size)), size), np.repeat(surface.face_start[:-1], size)
+    least = np.lexsort((vertex, owner))[first]
+    return vertex[first + (np.arange(len(vertex)) + least - 2 * first) % size[owner]]

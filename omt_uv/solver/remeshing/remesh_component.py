@@ -15,6 +15,7 @@ from .components.components import Component
 from .edits.vertex_count import SizingField, StuckError, reach_vertex_count
 from .edits.working_mesh import WorkingMesh
 from .fitting.fit import fit_to_surface
+from .fitting.retreat import retreated
 from .initial.component_maps import ComponentMaps
 from .initial.initial_mesh import InitialMesh, make_initial_mesh
 from .initial.options import RemeshOptions
@@ -84,7 +85,8 @@ def _settled(
         mesh, residual = yield from _relaxed(start, carrier, sizing, options, allow_folds)
     mesh = reach_vertex_count(mesh, start.vertex_count, sizing, allow_folds)
     if options.fit:
-        mesh = yield from part_of(fit_to_surface(mesh, index, level), 0.57, 0.43)
+        fitted = yield from part_of(fit_to_surface(mesh, index, level), 0.57, 0.43)
+        mesh = retreated(mesh, fitted, component.vertices, component.triangles)
     points, triangles = reopened(mesh.points, mesh.triangles, start.to_reopen)
     thin = _too_thin(component, points, start.size / np.sqrt(level))
     on = index(points, vertex_normals(points, triangles))

@@ -47,6 +47,20 @@ def test_diagrams_have_a_cell_for_every_vertex(run, tmp_path, domain):
     assert run(*files, "-o", tmp_path / "d.xyz")[0] == 1
 
 
+def test_a_diagram_of_one_of_several_objects_says_which(run, tmp_path):
+    for name, size in (("Small", (2, 2)), ("Large", (5, 4)), ("Other", (3, 2))):
+        scenes.bump(*size, name=name)
+    path, out = tmp_path / "in.blend", tmp_path / "d.obj"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    status, _, err = run("diagram", path, "-o", out)
+    assert status == 0 and "that of Large" in err and "2 other objects are left out" in err
+    assert "another object is left out" in run("diagram", path, "-o", out, "--object", "Large", "--object", "Small")[2]
+    assert run("diagram", path, "-o", out, "--object", "Small")[2] == ""
+    out.unlink()
+    status, _, err = run("diagram", path, "-o", out, "--strict")
+    assert status == 1 and "that of Large" in err and not out.exists()
+
+
 def test_open_meshes_have_no_diagram_of_the_sphere(run, tmp_path):
     scenes.bump()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))

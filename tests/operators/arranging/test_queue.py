@@ -31,6 +31,8 @@ def test_one_that_fails_is_named_and_selected_and_the_others_are_done(package):
     assert all(obj.data.uv_layers for obj in good)
     summary = package("session.last_run").state.summary
     assert dict(summary.rows)["Done"] == "2 of 3" and summary.notices[0].text.startswith("Flat: ")
+    # Once: the reason of its own names it, too.
+    assert summary.notices[0].text.count("Flat") == 1
     assert [obj.name for obj in bpy.context.selected_objects] == ["Flat"]
 
 
@@ -57,3 +59,18 @@ def test_stop_keeps_what_is_done(package):
     done = [obj for obj in objects if obj.data.uv_layers]
     assert len(done) == 1 and queue.state.is_over
     assert [job.state for job in queue.state.jobs] == ["DONE", "WAITING", "WAITING"]
+
+
+def test_what_may_not_be_written_is_told_before_it_is_unwrapped(package):
+    """By the name that Unwrap writes to, which here is that of another attribute."""
+    good, bad = scenes.bump(name="Good"), scenes.bump(name="Bad", offset=2.0)
+    bad.data.attributes.new("mine", "FLOAT", "POINT")
+    scenes.select([good, bad])
+    settings = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    settings.uv_layer = "mine"
+    assert bpy.ops.uv.omt_queue() == {"FINISHED"}
+    settings.property_unset("uv_layer")
+    jobs = {job.name: job for job in package("session.queue").state.jobs}
+    assert jobs["Good"].state == "DONE" and "mine" in good.data.uv_layers
+    assert jobs["Bad"].state == "FAILED" and "'mine' that is no UV layer" in jobs["Bad"].reason
+    assert jobs["Bad"].progress == 0

@@ -221,6 +221,23 @@ def test_strain_of_keys_uvs_and_poses():
     assert "has no shape key" in scenes.error_of(bpy.ops.object.omt_strain, of="KEY")
 
 
+def test_strain_asks_for_the_same_vertices_not_as_many_corners():
+    """Else a vertex of one is anything of the other, or nothing."""
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    cube = scenes.add(corners, faces, "Cube")
+    apart = [corners[v] for face in faces for v in face]
+    loose = scenes.add(apart, [tuple(range(4 * k, 4 * k + 4)) for k in range(6)], "Loose")
+    turned = scenes.add(corners, [face[1:] + face[:1] for face in faces], "Turned")
+    for others in ((loose, cube), (cube, loose)):
+        scenes.select(list(others))
+        assert "one other object" in scenes.error_of(bpy.ops.object.omt_strain, of="OBJECT")
+        assert "OMT Strain" not in others[1].data.attributes
+    # From whichever corner on.
+    scenes.select([turned, cube])
+    assert bpy.ops.object.omt_strain(of="OBJECT") == {"FINISHED"}
+
+
 def test_handles_are_no_hindrance_where_seams_cut_both_alike():
     (V, F), (W, G) = torus(16, 8), torus(24, 10)
     source, target = scenes.add(V, F, "Source"), scenes.add(W * [1.2, 1, 1], G, "Target")

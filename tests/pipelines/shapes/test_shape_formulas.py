@@ -283,6 +283,12 @@ def test_regions_are_means_of_weights_and_slots():
         assert found["a"][t] == pytest.approx(weights[f].mean())
         assert [found[f"material {n}"][t] for n in "xyz"] == (slots[surface.triangle_face[t]] == np.arange(3)).tolist()
     assert list(strain.regions_of(surface, {}, slots, ["x"])) == []
+    # A material in two slots is one region, and faces beyond the last slot are of that.
+    twice = strain.regions_of(surface, {}, slots, ["x", "y", "x"])
+    assert list(twice) == ["material x", "material y"]
+    assert np.array_equal(twice["material x"], found["material x"] + found["material z"])
+    few = strain.regions_of(surface, {}, slots, ["x", "y"])
+    assert np.array_equal(few["material y"], found["material y"] + found["material z"])
 
 
 def test_the_box_of_regions_is_that_of_the_faces_inside():

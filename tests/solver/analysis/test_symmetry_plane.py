@@ -133,3 +133,15 @@ def test_a_plane_is_carried_to_any_unit(power):
     far = plane.carried(V, np.ldexp(moved, power))
     assert far.offset == np.ldexp(plane.carried(V, moved).offset, power) != 0 and np.isfinite(far.offset)
     assert plane.carried(V, moved).distance(moved) == pytest.approx(3 * plane.distance(V), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("side", range(3))
+def test_of_planes_that_are_as_good_that_across_the_side_is_taken_however_the_body_lies(side, seed):
+    """A little lopsided, so that it has axes of its own, in whose frame planes are compared."""
+    V, F = meshes.icosphere(3)
+    rough = 1e-3 * np.random.default_rng(7).standard_normal(V.shape)
+    body = V * [1.0, 0.9, 0.8] * (1 + 0.3 * (V**4).sum(axis=1, keepdims=True)) + [0.01, 0.008, 0] * V**2 + rough
+    turn = Rotation.random(1, random_state=seed).as_matrix()[0]
+    plane = symmetry_plane(body @ turn.T, F, side=turn[:, side])
+    assert not plane.is_exact and degrees_between(plane.normal, turn[:, side]) < 2

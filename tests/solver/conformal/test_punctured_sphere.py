@@ -1,11 +1,13 @@
 """A sphere without one vertex: flat inside, and its boundary a closed polygon."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
 
 from omt_uv.solver.conformal.intrinsic_triangulation import euclidean_diagonal, from_mesh, make_delaunay
-from omt_uv.solver.conformal.punctured_sphere import flatten_punctured_sphere
+from omt_uv.solver.conformal.punctured_sphere import _inversion, flatten_punctured_sphere
 from omt_uv.solver.mesh.geometry import angles_from_lengths
 from omt_uv.solver.progress import drain
 
@@ -39,3 +41,27 @@ def test_all_spokes_to_infinity_are_equal(flat):
     tri = polygon.triangulation
     spokes = np.flatnonzero(tri.triangles.ravel() == puncture)
     np.testing.assert_allclose(tri.scaled(polygon.log_scale)[spokes], 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_scales_of_the_inversion_go_by_the_shortest_of_several_edges(seed):
+    """Distances by Bellman and Ford's loop over all edges, of which several may join the same two vertices."""
+    V, F = meshes.icosphere(1)
+    rng = np.random.default_rng(seed)
+    tri = from_mesh(V, F)
+    tri = replace(tri, triangles=F % 17, log_length=rng.normal(0, 0.5, F.size))
+    tail, head = tri.triangles.ravel(), tri.triangles[:, [1, 2, 0]].ravel()
+    assert len({frozenset(pair) for pair in zip(tail, head, strict=True)}) < F.size // 2
+    n = 17
+    for puncture in range(n):
+        distance, first = np.full(n, np.inf), np.full(n, np.inf)
+        distance[puncture] = 0
+        for _ in range(n):
+            for a, b, log in zip(tail, head, tri.log_length, strict=True):
+                distance[b] = min(distance[b], distance[a] + np.exp(log))
+                distance[a] = min(distance[a], distance[b] + np.exp(log))
+                if a == puncture:
+                    first[b] = min(first[b], log)
+        distance[puncture] = 1
+        expected = [-first[k] if np.isfinite(first[k]) else -np.log(distance[k]) for k in range(n)]
+        np.testing.assert_allclose(_inversion(tri, puncture), expected, rtol=1e-12)

@@ -9,14 +9,14 @@ from omt_uv.solver.packing.crumbs import gathered
 TRIANGLE, QUAD = np.array([[0, 1, 2]]), np.array([[0, 1, 2], [0, 2, 3]])
 
 
-def mixed(count, seed=0, size=1e-7):
+def mixed(count, seed=0, size=5e-4):
     """Islands of which every third is large, and all triangles."""
     rng = np.random.default_rng(seed)
     points, triangles = [], []
     for k in range(count):
         unit = 1.0 if k % 3 == 0 else size
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])[: 4 if k % 2 else 3]
-        points.append(unit * corners * rng.uniform(0.5, 1, 2) + rng.normal(size=2))
+        points.append(unit * corners * rng.uniform(0.4, 1, 2) ** 4 + rng.normal(size=2))
         triangles.append(QUAD if k % 2 else TRIANGLE)
     return points, triangles
 

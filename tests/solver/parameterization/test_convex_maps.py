@@ -18,6 +18,7 @@ from omt_uv.solver.parameterization.convex_maps import (
     OTHERWISE,
     with_convex_polygons,
     with_dents_told,
+    with_drawn_triangles,
     with_figures,
 )
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
@@ -230,3 +231,25 @@ def test_corners_are_forced_open_once_and_what_no_refinement_keeps_stays(monkeyp
     monkeypatch.setattr(convex_maps, "SHEAR_KEPT", 0.0)
     (found,) = drain(with_convex_polygons(surface, [chart], [chart_map], [None], MapOptions()))
     assert len(forced) == len(refined) == 1 and not reflex(surface, chart, found.uv)
+
+
+@pytest.mark.parametrize("folds, kept", [((2, 4, 4), 2), ((4, 2, 3), 2), ((5, 5, 1), 1), ((6, 7, 8), 5)])
+def test_of_several_rounds_that_with_fewest_folds_is_kept(monkeypatch, folds, kept):
+    surface, chart, start = darts()
+    start = replace(start, folds=5)
+    rounds = iter(range(1, 4))
+
+    def by_triangles(*_):
+        yield from ()
+        return start.uv + next(rounds)
+
+    def measured(_chart, uv, _density):
+        return replace(measured_map(chart, start.uv, None), folds=folds[round((uv - start.uv).max()) - 1])
+
+    later = iter(np.eye(len(chart.triangles), dtype=bool))
+    monkeypatch.setattr(convex_maps, "_by_triangles", by_triangles)
+    monkeypatch.setattr(convex_maps, "measured_map", measured)
+    monkeypatch.setattr(convex_maps, "_dented", lambda *_: next(later))
+    monkeypatch.setattr(convex_maps, "_keeps", lambda *_: True)
+    (found,) = drain(with_drawn_triangles(surface, [chart], [start], [None], MapOptions()))
+    assert found.folds == kept

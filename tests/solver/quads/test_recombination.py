@@ -113,3 +113,29 @@ def test_other_diagonals_leave_all_other_edges_as_they_are(seed):
     after = np.linalg.norm(V[a[h]] - V[b[h]], axis=1)
     assert (after <= before).all() and (after < before).any()
     np.testing.assert_array_equal(now, with_shorter_diagonals(V, now, place[chosen])[0])
+
+
+@pytest.mark.parametrize("angle, taken", [(6.0, True), (9.0, True), (12.0, True)])
+def test_quads_may_have_acute_corners(angle, taken):
+    """A dart of few degrees beside good quads is a quad all the same; what is nearly straight is none."""
+    V, Q = quads_of(4, 4, bend=0.0)
+    n, a = len(V), np.radians(angle / 2)
+    far = 2.0
+    kite = np.array([[0, 0], [np.cos(a), -np.sin(a)], [np.cos(a) + 0.25, 0], [np.cos(a), np.sin(a)]]) * far + 20
+    V = np.concatenate([V, np.column_stack([kite, np.zeros(4)])])
+    F, _ = triangulated(Q)
+    F = np.concatenate([F, [[n, n + 1, n + 2], [n, n + 2, n + 3]]])
+    pair = inner(F)
+    tail, head = halfedges(F)
+    mine = np.isin(tail[pair[:, 0]], (n, n + 2)) & np.isin(head[pair[:, 0]], (n, n + 2))
+    assert mine.sum() == 1 and quad_diagonals(V, F, pair)[mine].tolist() == [taken]
+
+
+def test_quads_have_no_straight_corners():
+    V, Q = quads_of(4, 4, bend=0.0)
+    n = len(V)
+    flat = np.array([[0, 0, 0], [1, -0.02, 0], [2, 0, 0], [1, 1, 0.0]]) + 20
+    F = np.concatenate([triangulated(Q)[0], [[n, n + 1, n + 3], [n + 1, n + 2, n + 3]]])
+    pair = inner(F)
+    mine = (F.ravel()[pair] >= n).all(axis=1)
+    assert mine.sum() == 1 and not quad_diagonals(np.concatenate([V, flat]), F, pair)[mine].any()

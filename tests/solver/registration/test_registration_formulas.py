@@ -8,9 +8,11 @@ import pytest
 from scipy.linalg import eigh
 from sphere_shapes import blob
 
+from omt_uv.solver.errors import HandednessError
 from omt_uv.solver.mesh.geometry import cotangent_laplacian, vertex_areas
 from omt_uv.solver.registration import functional_maps, landmark_flow, suggestions
 from omt_uv.solver.registration.alignment import MoebiusMap, moebius_of_pairs
+from omt_uv.solver.registration.landmarks import Landmarks, check_handedness
 from omt_uv.solver.registration.straight_walks import StraightWalks, _within
 
 
@@ -172,3 +174,20 @@ def test_peaks_are_vertices_above_all_neighbours_and_apart(closed):
     near = suggestions._peaks(value, 1e-6 * V, F)
     assert near.tolist() == [value.argmax()]
     assert not len(suggestions._peaks(0 * value, V, F))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 7])
+def test_mirrored_landmarks_are_refused_from_three_pairs_on(count):
+    rng = np.random.default_rng(count)
+    points = rng.normal(size=(count, 3))
+    points[:3] = np.eye(3)[: min(count, 3)]
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    row = np.zeros(count, int)
+    marks = Landmarks(row, np.eye(3)[row], row, np.eye(3)[row])
+    check_handedness(marks, points, points @ np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0.0]]))
+    if count == 2:
+        # Two pairs fit either way.
+        check_handedness(marks, points, points * [-1, 1, 1])
+    else:
+        with pytest.raises(HandednessError):
+            check_handedness(marks, points, points * [-1, 1, 1])

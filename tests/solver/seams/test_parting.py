@@ -14,6 +14,7 @@ from omt_uv.solver.maps.overlap import cover_pairs, overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -405,3 +406,18 @@ def test_nothing_steep_nothing_slit():
     (chart,) = strict_charts(triangle_surface(V, F))
     nowhere = np.zeros(len(V), dtype=bool)
     assert slits(chart, np.zeros(len(F), dtype=bool), 0.0, np.ones(len(V)), nowhere).shape == (0, 2)
+
+
+def test_a_slit_goes_to_the_one_before_where_that_is_nearer_than_the_boundary():
+    V, F = meshes.grid(40, 40)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    spots = [(0.42, 0.5, 0.0), (0.58, 0.5, 0.0)]
+    one, other = (steep_spots(V, F, spot, radius=0.06) for spot in spots)
+    cost, barred = np.ones(len(V)), np.zeros(len(V), dtype=bool)
+    both = slits(chart, one | other, np.inf, cost, barred)
+    alone = [slits(chart, mine, np.inf, cost, barred) for mine in (one, other)]
+    # A slit of the boundary alone takes as many edges for each.
+    assert min(map(len, alone)) <= len(both) < 0.8 * sum(map(len, alone))
+    # All of it hangs together.
+    _, ends = np.unique(both, return_inverse=True)
+    assert len(np.unique(graph_components(*ends.reshape(-1, 2).T, int(ends.max()) + 1)[1])) == 1

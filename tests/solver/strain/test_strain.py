@@ -8,7 +8,7 @@ from meshes import bumpy, icosphere
 from sphere_shapes import random_rotation
 
 from omt_uv.solver.strain.beltrami import beltrami, corner_beltrami
-from omt_uv.solver.strain.collection import mean_shape
+from omt_uv.solver.strain.collection import LEAST_DEVIATION, mean_shape
 from omt_uv.solver.strain.figures import match_figures
 from omt_uv.solver.strain.regions import compare_regions, region_strain
 
@@ -88,3 +88,26 @@ def test_a_mean_over_faces_that_fold_is_still_a_share():
     middles = (np.arange(2000) + 0.5) / 2000
     assert 0 < found.mean <= 1 and found.mean == pytest.approx(found.histogram(2000) @ middles, abs=1e-3)
     assert (beltrami(V, F, V[:, :2] * [-1, 1]).mean, beltrami(V, F, V).mean) == pytest.approx((1, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_scores_are_distances_over_deviations_of_others_that_are_not_too_small(count):
+    """Against loops; least deviations are means over the surface, of which some vertices have more than others."""
+    rng = np.random.default_rng(count)
+    V, _ = icosphere(1)
+    # What swells at both ends turns and shifts nothing.
+    ends = np.abs(V[:, 2]) > 0.8
+    weight = np.where(ends, 3.0, 0.5)
+    swollen = 1 + 0.3 * rng.random(count)[:, None, None] * ends[:, None]
+    shapes = V * [1, 1.4, 0.6] * swollen + 1e-5 * rng.normal(size=(count, len(V), 3))
+    found = mean_shape(shapes, weight)
+    least = 0
+    for k in range(count):
+        others = [j for j in range(count) if j != k]
+        mean = found.aligned[others].mean(axis=0)
+        off = np.sqrt(((found.aligned[others] - mean) ** 2).sum(axis=2).mean(axis=0))
+        bound = LEAST_DEVIATION * (weight @ off) / weight.sum()
+        least += (off < bound).sum()
+        far = np.linalg.norm(found.aligned[k] - mean, axis=1)
+        np.testing.assert_allclose(found.score[k], far / np.maximum(off, bound), rtol=1e-5)
+    assert least > 5

@@ -9,6 +9,7 @@ from mesh_checks import topology
 
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.remeshing.initial import disk_samples
 from omt_uv.solver.remeshing.initial.arc_network import ChartBoundary
 from omt_uv.solver.remeshing.initial.disk_samples import (
     even_image,
@@ -60,3 +61,20 @@ def test_a_chart_gets_the_samples_that_it_is_given():
     np.testing.assert_allclose(np.linalg.norm(image[loop], axis=1), 1)
     mesh = triangulate_chart(V, F, loop, (image, image), boundary, 70)
     assert len(mesh.points) == 70 and topology(mesh.triangles) == (1, 1) and mesh.triangles.max() == 89
+
+
+def test_samples_beyond_a_chord_are_pulled_to_a_share_of_its_length_from_it():
+    turn = np.array([0.1, 0.9, 1.4, 3.0, 4.4, 5.6])
+    boundary = np.column_stack([np.cos(turn), np.sin(turn)])
+    inner = circle(29) * np.linspace(0.4, 0.9999, 29)[:, None]
+    found = disk_samples._inside(boundary, inner)
+    moved = 0
+    for before, after in zip(inner, found, strict=True):
+        angle = (np.arctan2(before[1], before[0]) - turn[0]) % (2 * np.pi) + turn[0]
+        k = int(np.searchsorted(turn, angle, side="right")) - 1
+        half = ((turn[(k + 1) % 6] - turn[k]) % (2 * np.pi)) / 2
+        # The chord's distance from the centre along the ray, less a share of half its length times its angle.
+        most = np.cos(half) / np.cos(angle - turn[k] - half) - disk_samples.CHORD_MARGIN * np.sin(half) * half - 1e-9
+        moved += np.linalg.norm(before) > most
+        np.testing.assert_allclose(after, before * min(1, most / np.linalg.norm(before)), rtol=0, atol=1e-12)
+    assert 5 < moved < 25

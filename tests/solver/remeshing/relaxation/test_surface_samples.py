@@ -85,6 +85,12 @@ def test_tips_are_the_corners_of_a_cube_first():
     tips = tip_samples(index_of(V, F), 8)
     corners = (np.abs(V - V.mean(axis=0)) > 0.5 - 1e-12).all(axis=1)
     assert {tuple(p) for p in tips.points} == {tuple(p) for p in V[corners]}
+    # However few there are, each counts for a quarter of what as many as were asked for have.
+    V, F = meshes.cube()
+    for most in (5, 8, 40):
+        few = tip_samples(index_of(V, F), most)
+        assert len(few.points) == min(most, 8)
+        np.testing.assert_allclose(few.area, face_areas(V, F).sum() / (4 * most))
     assert len(tip_samples(index_of(*meshes.grid(6, 6)), 8).points) == 0
 
 

@@ -56,3 +56,13 @@ def test_what_has_too_few_vertices_demands_more_each_time_and_what_has_too_many_
     above = carrier.density[carrier._samples.faces] > 1
     assert change[above].mean() > 1.02 and change[~above].mean() < 0.98
     assert change.min() >= 0.9 and change.max() <= 1.1
+
+
+def test_at_an_even_density_nothing_is_demanded_beyond_the_measure():
+    """Whatever was demanded before: what relaxation takes away along jumps of the density has no jump here."""
+    mesh, carrier, sizing = on_a_sphere(1.0)
+    demands = None, carrier.measure, carrier.measure * (1 + 0.5 * np.sin(np.arange(len(carrier.measure))))
+    first, *others = (balance_vertices(mesh, carrier, sizing, demand) for demand in demands)
+    for found in others:
+        np.testing.assert_array_equal(found.demand, carrier.measure)
+        np.testing.assert_array_equal(found.mesh.points, first.mesh.points)

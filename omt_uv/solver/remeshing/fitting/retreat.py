@@ -1,0 +1,40 @@
+"""Take back a fit where faces have come to pass through one another: a thin part has two sides, and what is brought
+nearer to one may go through the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...contact.self_intersections import FaceCrossings, intersecting_pairs
+from ..edits.working_mesh import WorkingMesh
+
+# Rounds in which more vertices go back.
+ROUNDS = 8
+
+
+def retreated(before: WorkingMesh, fitted: WorkingMesh, vertices: np.ndarray, triangles: np.ndarray) -> WorkingMesh:
+    """A fitted mesh with vertices around faces that intersect where they were before the fit, as far as fewer do then.
+
+    The mesh of a surface (n,3), (m,3) that intersects itself is left as it is.
+    """
+    crossings, points = FaceCrossings(fitted.triangles), fitted.points
+    pairs = crossings.pairs(points)
+    if not len(pairs) or len(intersecting_pairs(vertices, triangles)):
+        return fitted
+    best, fewest, back = points, len(pairs), np.zeros(len(points), dtype=bool)
+    for _ in range(ROUNDS):
+        meeting = np.zeros(len(points), dtype=bool)
+        meeting[fitted.triangles[pairs]] = True
+        if back[meeting].all():
+            # That was not enough: what lies around them goes back, too.
+            meeting[fitted.triangles[meeting[fitted.triangles].any(axis=1)]] = True
+        back |= meeting
+        points = np.where(back[:, None], before.points, fitted.points)
+        pairs = crossings.pairs(points)
+        if len(pairs) < fewest:
+            best, fewest = points, len(pairs)
+        if not fewest:
+            break
+    return replace(fitted, points=best)
