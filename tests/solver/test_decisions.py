@@ -13,7 +13,7 @@ from omt_uv.solver.editing import outline, refine_island
 from omt_uv.solver.flows import creases
 from omt_uv.solver.globe import projections
 from omt_uv.solver.mesh import charts
-from omt_uv.solver.parameterization import convex_maps, mirrored_charts, shear_bound, shear_search, small_charts
+from omt_uv.solver.parameterization import convex_maps, mirrored_charts, pieces, shear_search, small_charts
 from omt_uv.solver.remeshing.initial.options import STRATEGIES, RemeshOptions
 from omt_uv.solver.remeshing.relaxation import vertex_balance
 from omt_uv.solver.seams import path_graph, rehearsal
@@ -147,7 +147,7 @@ def test_a_chart_may_cross_itself_where_it_was_slit_in_vain_or_misses_by_much(la
     much = bound ** np.sqrt(1.35)
     for mean in (0.9 * bound, (1 + 0.99 * 0.01) * bound, (1 + 1.01 * 0.01) * bound,
                  0.9999 * much, 1.0001 * much):  # fmt: skip
-        asked = shear_bound._may_cross(SimpleNamespace(mean=np.array([9.0, mean]), bound=bound), 1, late, rounds)
+        asked = pieces._may_cross(SimpleNamespace(mean=np.array([9.0, mean]), bound=bound), 1, late, rounds)
         missed = mean > (1 + 0.01) * bound
         assert asked == (rounds > 2 or (missed and (late or mean >= much)))
 
