@@ -118,12 +118,13 @@ def in_halves(
     search: ShearSearch, last: Round, cut: Callable[[Round, list[int], np.ndarray], Steps[Round | None]]
 ) -> Steps[Round]:
     """A round whose charts that miss the bound by much come apart in two, again where that was of help: nothing else
-    was. cut : makes the next round of one, the numbers of its charts to be cut anew, and the edges that stay cut."""
+    was. cut : makes the next round of one, the numbers of its charts to be cut anew, and the edges that stay cut. Where
+    something is to be kept free of cuts they stay whole."""
     from ..seams.parting import halves
 
     for _ in range(MOST_HALVINGS):
         missed = [k for k in last.searched if last.mean[k] > (1 + NEARLY) * last.bound]
-        if not missed:
+        if not missed or search.cutting.get("avoid") is not None:
             break
         edges = [halves(last.charts[k], search.costs().vertex_cost) for k in missed]
         new = yield from cut(last, missed, np.concatenate([last.kept(missed), *edges]))

@@ -410,10 +410,14 @@ def test_what_misses_its_bound_by_much_comes_apart_in_halves_as_often_as_that_he
     monkeypatch.setattr(shear_bound, "_cut_anew", cut_anew)
     monkeypatch.setattr(parting, "halves", lambda chart, cost: np.array([[chart.faces[0], cost]]))
     monkeypatch.setattr(shear_bound.Round, "kept", lambda self, chosen: np.array([[7, 8]]))
-    search = SimpleNamespace(first_spread=lambda: "spread", costs=lambda: SimpleNamespace(vertex_cost=9))
+    costs = SimpleNamespace(vertex_cost=9)
+    search = SimpleNamespace(first_spread=lambda: "spread", costs=lambda: costs, cutting={})
     assert drain(shear_bound._in_halves(search, rounds[0], None, EarlyEnd())) is rounds[taken]
     assert asked[0].charts == [0] and asked[0].kept.tolist() == [[7, 8], [0, 9]] and asked[0].spread == "spread"
     assert asked[0].changes == {} and asked[0].is_worth(rounds[0].cuts)
+    # Not where anything is to be kept free.
+    search.cutting["avoid"] = np.zeros(3)
+    assert drain(shear_bound._in_halves(search, rounds[0], None, EarlyEnd())) is rounds[0]
 
 
 @pytest.mark.parametrize(
