@@ -236,8 +236,9 @@ def test_enter_keeps_the_best_so_far_and_escape_restores_everything(package, mon
     summary = package("session.last_run").state.summary
     assert any("seams were done" in notice.text for notice in summary.notices)
     kept = scenes.uv_of(obj)
-    monkeypatch.setattr(package("solver.parameterization.shear_bound"), "MOST_ROUNDS", 1)
-    monkeypatch.setattr(package("solver.parameterization.pieces"), "MOST_HALVINGS", 0)
+    bound = package("solver.parameterization.shear_bound")
+    monkeypatch.setattr(bound, "MOST_ROUNDS", 1)
+    monkeypatch.setattr(bound, "MOST_HALVINGS", 0)
     assert bpy.ops.uv.omt_unwrap(max_shear=1.02) == {"FINISHED"}
     assert np.array_equal(scenes.uv_of(obj), kept)
 

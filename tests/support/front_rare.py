@@ -240,8 +240,7 @@ def operated(folder: Path, capfd) -> Iterator[tuple[str, object]]:
                 told += twin_scenes.told(capfd, name, arguments)
             except TypeError as error:
                 raise AssertionError((name, arguments)) from error
-            rows = state.summary.rows if state.summary else ()
-            told.append([row for row in rows if row[0] != "Time"])
+            told.append(front_runs.rows_of(state.summary) if state.summary else [])
         if bpy.context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         names = " ".join(f"{name} {sorted(map(_word, arguments.values()))}" for name, arguments in operators)
@@ -302,8 +301,10 @@ def commanded(there: Path, run, capfd) -> Iterator[tuple[str, object]]:
                 told.append(np.load(path))
             elif path.suffix == ".npz":
                 told += [[name, values] for name, values in sorted(np.load(path).items())]
-            elif path.suffix in front_runs.TEXTS + (".vtu",):
-                told.append(front_runs._text(path) if path.suffix != ".vtu" else path.read_text())
+            elif path.suffix == ".vtu":
+                told.append(path.read_text())
+            elif path.suffix in front_runs.TEXTS:
+                told.append(front_runs.text_of(path))
         if status == 0 and (there / "out.blend").exists():
             bpy.ops.wm.open_mainfile(filepath=str(there / "out.blend"))
             told.append(front_runs.left())

@@ -141,7 +141,7 @@ def prepare(folder: Path, run) -> None:
     bpy.ops.export_scene.gltf(filepath=str(there / "plain.glb"))
 
 
-def _text(path: Path):
+def text_of(path: Path):
     """What a file says, a report by its keys, of which seconds are let be; None for what is no text."""
     if path.suffix not in TEXTS:
         return None
@@ -162,13 +162,18 @@ def left() -> dict:
     return found
 
 
+def rows_of(summary) -> list:
+    """The rows of a summary but for the time it took."""
+    return [row for row in summary.rows if row[0] != "Time"]
+
+
 def told(folder: Path, run, capfd) -> Iterator[tuple[str, object]]:
     """Names of runs, and what each printed, reported and left; run: a command, words."""
     summary = importlib.import_module("omt_uv.session.last_run").state
     for name, objects, arguments in OPERATORS:
         twin_scenes.begin(folder, objects)
         why, lines = twin_scenes.told(capfd, name, arguments)
-        rows = [row for row in (summary.summary.rows if summary.summary else ()) if row[0] != "Time"]
+        rows = rows_of(summary.summary) if summary.summary else []
         yield f"{name} {objects} {list(arguments.values())}", [why, lines, rows, left()]
     yield from commanded(folder, run, capfd, COMMANDS)
 
@@ -190,7 +195,7 @@ def commanded(folder: Path, run, capfd, commands) -> Iterator[tuple[str, object]
             capfd.readouterr()
             status, printed = run(*words), list(capfd.readouterr())
             written = sorted(path for path in there.iterdir() if path.is_file() and path not in given)
-            texts = [_text(path) for path in written]
+            texts = [text_of(path) for path in written]
             if status == 0 and (there / "out.blend").exists():
                 bpy.ops.wm.open_mainfile(filepath=str(there / "out.blend"))
             yield f"{name} {file} {more}".strip(), [status, printed, written, texts, left()]

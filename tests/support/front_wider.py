@@ -168,7 +168,7 @@ def operated(folder: Path, capfd) -> Iterator[tuple[str, object]]:
 
 def _rows() -> list:
     summary = importlib.import_module("omt_uv.session.last_run").state.summary
-    return [[row for row in summary.rows if row[0] != "Time"], summary.notices] if summary else []
+    return [front_runs.rows_of(summary), summary.notices] if summary else []
 
 
 def on_broken_meshes(capfd) -> Iterator[tuple[str, object]]:

@@ -179,7 +179,8 @@ def _overhangs(
     used = area > 0
     feet = along[used & (height < height[used].min() + FEET * np.ptp(height[used]))]
     before, behind = (area[beyond].sum() / area.sum() for beyond in (along > feet.max(), along < feet.min()))
-    if max(before, behind) < OVERHANG[0] or max(before, behind) < OVERHANG[1] * min(before, behind):
+    least, most = sorted((before, behind))
+    if most < max(OVERHANG[0], OVERHANG[1] * least):
         return 0
     return 1 if before > behind else -1
 

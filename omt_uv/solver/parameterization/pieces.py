@@ -33,8 +33,6 @@ MORE_SLIT = 0.001
 SHEARED = 2.0
 # What is steep alone is slit so many times before it may come apart.
 SLIT_AT_FIRST = 2
-# What misses the bound whatever is cut comes apart in two so many times.
-MOST_HALVINGS = 3
 
 
 def come_apart(
@@ -112,26 +110,6 @@ def _slit(search: ShearSearch, last: Round, k: int, rounds: int) -> np.ndarray:
     costs, here = search.costs(), chart.vertex_ids
     least, barred = (SLIT * excess + MORE_SLIT * (rounds - 1)) * area.sum(), costs.in_face[here]
     return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images, rounds)
-
-
-def in_halves(
-    search: ShearSearch, last: Round, cut: Callable[[Round, list[int], np.ndarray], Steps[Round | None]]
-) -> Steps[Round]:
-    """A round whose charts that miss the bound by much come apart in two, again where that was of help: nothing else
-    was. cut : makes the next round of one, the numbers of its charts to be cut anew, and the edges that stay cut. Where
-    something is to be kept free of cuts they stay whole."""
-    from ..seams.parting import halves
-
-    for _ in range(MOST_HALVINGS):
-        missed = [k for k in last.searched if last.mean[k] > (1 + NEARLY) * last.bound]
-        if not missed or search.cutting.get("avoid") is not None:
-            break
-        edges = [halves(last.charts[k], search.costs().vertex_cost) for k in missed]
-        new = yield from cut(last, missed, np.concatenate([last.kept(missed), *edges]))
-        if new is None or new.excess >= last.excess or new.is_hardly_better(last):
-            break
-        last = new
-    return last
 
 
 def in_pieces(

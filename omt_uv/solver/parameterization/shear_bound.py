@@ -16,7 +16,7 @@ from ..seams.options import COMPACT, SPREAD_BY_SHEAR
 from .chart_indices import but_within, edge_set, is_marked
 from .chart_map import ChartMap
 from .mirrored_charts import mapped_anew
-from .pieces import come_apart, in_halves
+from .pieces import come_apart
 from .shear_search import (
     MARGIN,
     NEARLY,
@@ -50,6 +50,8 @@ LEFT = 0.5
 SEARCHING = 0.25
 # Where charts lie on themselves that may, before that.
 PARTING = 0.3
+# What misses the bound whatever is cut comes apart in two so many times.
+MOST_HALVINGS = 3
 # Charts that are joined again, at the end.
 JOINING = 0.05
 
@@ -245,13 +247,22 @@ def _along_all_creases(search: ShearSearch, last: Round, map_charts, early: Earl
 
 
 def _in_halves(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
-    """A round that misses its bound, or where it misses it by less one whose charts come apart in halves."""
+    """A round whose charts that miss the bound by much come apart in two, again where that was of help: nothing else
+    was. Where something is to be kept free of cuts they stay whole."""
+    from ..seams.parting import halves
 
-    def cut(last: Round, charts: list[int], kept: np.ndarray) -> Steps[Round | None]:
-        asked = Asked(charts, kept, search.first_spread(), {}, lambda edges: True)
-        return _cut_anew(search, last, asked, map_charts, early)
-
-    return (yield from in_halves(search, last, cut))
+    for _ in range(MOST_HALVINGS):
+        missed = [k for k in last.searched if last.mean[k] > (1 + NEARLY) * last.bound]
+        if not missed or search.cutting.get("avoid") is not None:
+            break
+        edges = [halves(last.charts[k], search.costs().vertex_cost) for k in missed]
+        kept = np.concatenate([last.kept(missed), *edges])
+        asked = Asked(missed, kept, search.first_spread(), {}, lambda edges: True)
+        new = yield from _cut_anew(search, last, asked, map_charts, early)
+        if new is None or new.excess >= last.excess or new.is_hardly_better(last):
+            break
+        last = new
+    return last
 
 
 def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, early: EarlyEnd) -> Steps[Round]:

@@ -72,7 +72,7 @@ def test_a_lower_bound_takes_longer_seams():
 def test_a_draft_has_the_seams_that_are_predicted(monkeypatch):
     """Its shear says nothing of the one that Standard leaves."""
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
-    monkeypatch.setattr(pieces, "MOST_HALVINGS", 0)
+    monkeypatch.setattr(shear_bound, "MOST_HALVINGS", 0)
     surface = triangle_surface(*meshes.cap(rings=12, sectors=24, opening=0.9))
     found = [unwrapped(surface, 1.3, quality=quality).seams for quality in ("draft", "standard")]
     assert len(found[0]) and np.array_equal(*found)
@@ -159,7 +159,7 @@ def test_what_misses_the_bound_says_so(monkeypatch):
     # A search that is content with anything, and no other.
     monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 1e4)
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
-    monkeypatch.setattr(pieces, "MOST_HALVINGS", 0)
+    monkeypatch.setattr(shear_bound, "MOST_HALVINGS", 0)
     result = unwrapped(triangle_surface(V, F), 1.3)
     (warning,) = result.warnings
     assert MORE_SEAMS in warning and "An island shears" in warning and "above 1.3" in warning
@@ -169,7 +169,7 @@ def test_a_warning_tells_how_much_of_the_surface_it_is_about(monkeypatch):
     """A cap of a hundredth of a wide flat grid shears, and nobody shall take it for the body."""
     monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 1e4)
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
-    monkeypatch.setattr(pieces, "MOST_HALVINGS", 0)
+    monkeypatch.setattr(shear_bound, "MOST_HALVINGS", 0)
     V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
     size = np.sqrt(face_areas(V, F).sum() * 99)
     square = np.array([[0, 0, 0], [size, 0, 0], [size, size, 0], [0, size, 0]]) + [5, 0, 0]
@@ -219,7 +219,7 @@ def test_an_early_end_keeps_the_last_whole_map(monkeypatch):
     middle, more = ended_at(surface, 1.2, when=8)
     assert more == 8
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
-    monkeypatch.setattr(pieces, "MOST_HALVINGS", 0)
+    monkeypatch.setattr(shear_bound, "MOST_HALVINGS", 0)
     first = unwrapped(surface, 1.2)
     for found in (ended, middle):
         assert np.array_equal(found.seams, first.seams) and len(found.seams) < len(whole.seams)
@@ -443,7 +443,7 @@ def test_what_misses_the_bound_by_little_keeps_it_with_areas_as_exact_as_is_prom
     far = ((V[:, :2] - V[:, :2].mean(axis=0)) ** 2).sum(axis=1)
     surface = triangle_surface(np.column_stack([V[:, :2], np.exp(-4 * far / far.max())]), F)
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
-    monkeypatch.setattr(pieces, "MOST_HALVINGS", 0)
+    monkeypatch.setattr(shear_bound, "MOST_HALVINGS", 0)
     monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 1e4)
     (plain,) = unwrapped(surface, 0).maps
     bound = plain.angle_mean - 0.005

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...contact.self_intersections import FaceCrossings, intersecting_pairs
+from ...mesh.topology import vertices_around
 from ..edits.working_mesh import WorkingMesh
 
 # Rounds in which more vertices go back.
@@ -25,11 +26,12 @@ def retreated(before: WorkingMesh, fitted: WorkingMesh, vertices: np.ndarray, tr
         return fitted
     best, fewest, back = points, len(pairs), np.zeros(len(points), dtype=bool)
     for _ in range(ROUNDS):
-        meeting = np.zeros(len(points), dtype=bool)
-        meeting[fitted.triangles[pairs]] = True
+        met = np.zeros(len(fitted.triangles), dtype=bool)
+        met[pairs] = True
+        meeting = vertices_around(fitted.triangles, met, len(points), 0)
         if back[meeting].all():
             # That was not enough: what lies around them goes back, too.
-            meeting[fitted.triangles[meeting[fitted.triangles].any(axis=1)]] = True
+            meeting = vertices_around(fitted.triangles, met, len(points), 1)
         back |= meeting
         points = np.where(back[:, None], before.points, fitted.points)
         pairs = crossings.pairs(points)
