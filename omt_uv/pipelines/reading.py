@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..solver.analysis.facing import Y_UP as Y_UP
 from ..solver.analysis.facing import Z_UP, SceneAxes
 from ..solver.errors import NonFiniteError
 from ..solver.mesh.surface import Surface, check_finite
 from ..solver.parameterization.chart_indices import CornerPins
 from ..solver.subdivision.modifier import SubdivisionModifier
-
-# Of files whose coordinates are taken as they are, in formats in which Y is up by custom.
-Y_UP = SceneAxes(up=(0.0, 1.0, 0.0), viewer=(0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..settings import Settings
+from ..solver.analysis.facing import Y_UP, SceneAxes
 from ..solver.canonical.markers import MapMarkers
 from ..solver.errors import MERGING, MeshError, plural
 from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
-from ..solver.mesh.geometry import signed_areas
+from ..solver.mesh.geometry import signed_areas, turned_by
 from ..solver.mesh.repair import joined_vertices
 from ..solver.mesh.surface import side_ends, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
@@ -57,6 +58,7 @@ def lay_out(
     """
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
+    as_they_stand, jobs = jobs, [_set_up(job) for job in jobs]
     given, prepare = jobs, {"charts": _with_charts, "auto": _joined}.get(settings.seams, _as_it_is)
     prepared = [prepare(index, job) for index, job in enumerate(jobs)]
     jobs = [job for job, _ in prepared]
@@ -93,7 +95,22 @@ def lay_out(
     rounded = iter(in_single_precision(moved))
     placed = [i if stays else next(rounded) for i, stays in zip(mapped, pinned, strict=True)]
     corners, uv = corner_uvs(len(maps), placed)
-    return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
+    as_given = [_set_back(one, job.axes) for one, job in zip(maps, as_they_stand, strict=True)]
+    return Layout(corners=corners, uv=uv, maps=as_given, packing=packed, warnings=warnings)
+
+
+def _set_up(job: UnwrapJob) -> UnwrapJob:
+    """The job with its surface turned so that Y is up: the same body gets the same cuts whatever its file calls up, for
+    a search that branches tells roundings apart."""
+    positions = turned_by(job.surface.positions, job.axes.frame)
+    return replace(job, surface=replace(job.surface, positions=positions), axes=Y_UP)
+
+
+def _set_back(found: SurfaceMap, axes: SceneAxes) -> SurfaceMap:
+    """What was found for a surface that `_set_up` has turned, as it stands itself."""
+    back = axes.frame.T
+    charts = [replace(chart, vertices=turned_by(chart.vertices, back)) for chart in found.charts]
+    return replace(found, charts=charts, axes=None if found.axes is None else found.axes.turned_by(back))
 
 
 def _upright(

@@ -1,19 +1,23 @@
 """Many objects unwrapped at once."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from work import counted_work
 
 from omt_uv.pipelines import unwrap as unwrap_pipeline
 from omt_uv.pipelines.layout import Refusal, UnwrapJob
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import Settings
+from omt_uv.solver.analysis.facing import Y_UP, SceneAxes
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.unwrap import predicted_cuts
 from omt_uv.solver.progress import drain
 
 
@@ -83,7 +87,7 @@ def test_a_mesh_split_by_an_importer_is_mapped_as_if_it_were_whole():
     V, F = meshes.icosphere(2)
     settings = Settings(max_shear=1.35)
     whole, apart = (drain(lay_out([UnwrapJob(s)], settings)) for s in (triangle_surface(V, F), split(V, F)))
-    assert len(apart.maps[0].charts) == len(whole.maps[0].charts) == 1
+    assert len(apart.maps[0].charts) == len(whole.maps[0].charts)
     assert [text for _, text in whole.warnings] == []
     assert [text for _, text in apart.warnings if f"{3 * len(F) - len(V)} boundary vertices" in text]
     order = [np.argsort(layout.corners[0]) for layout in (whole, apart)]
@@ -94,6 +98,48 @@ def test_a_mesh_split_by_an_importer_is_mapped_as_if_it_were_whole():
     assert (seams[:, 0] // 3 == seams[:, 1] // 3).all()
     places = {frozenset(map(tuple, V[F].reshape(-1, 3)[edge])) for edge in seams}
     assert places == {frozenset(map(tuple, V[edge])) for edge in whole.maps[0].seams}
+
+
+# Of positions as rows, from where Y is up: Z up as in Blender, X up, and askew.
+TURNS = {
+    "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "x": np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]),
+    "askew": Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix(),
+}
+
+
+def lying(surface, rotation):
+    """A surface multiplied by a rotation, with its axes, as `Y_UP` says those of what is given."""
+    return UnwrapJob(replace(surface, positions=surface.positions @ rotation), axes=Y_UP.turned_by(rotation))
+
+
+@pytest.mark.parametrize("max_shear", [0.0, 1.3])
+@pytest.mark.parametrize("turn", TURNS)
+def test_what_a_file_calls_up_is_all_one(turn, max_shear):
+    V, F = meshes.torus(16, 8)
+    V = V + 0.1 * np.sin(3 * V[:, [1, 2, 0]])
+    settings, surface = Settings(max_shear=max_shear), triangle_surface(V, F)
+    job = lying(surface, TURNS[turn])
+    first, other = (drain(lay_out([one], settings)) for one in (UnwrapJob(surface, axes=Y_UP), job))
+    # Turned askew, places are rounded.
+    close = 1e-5 if turn == "askew" else 0.0
+    np.testing.assert_array_equal(first.corners[0], other.corners[0])
+    np.testing.assert_allclose(first.uv[0], other.uv[0], rtol=0, atol=close)
+    for one, chart in zip(first.maps[0].charts, other.maps[0].charts, strict=True):
+        np.testing.assert_allclose(one.vertices @ TURNS[turn], chart.vertices, atol=1e-14)
+    every = np.ones(len(F), bool)
+    cuts = [predicted_cuts(j.surface, every, max_shear, j.axes).edges for j in (UnwrapJob(surface, axes=Y_UP), job)]
+    np.testing.assert_array_equal(*cuts)
+
+
+def test_axes_in_single_precision_turn_nothing_askew():
+    exact = Y_UP.turned_by(TURNS["z"])
+    rough = SceneAxes(tuple(np.array(exact.up) + 3e-8), tuple(np.array(exact.viewer) - 3e-8))
+    np.testing.assert_array_equal(rough.frame, exact.frame)
+    np.testing.assert_array_equal(exact.frame, TURNS["z"].T)
+    np.testing.assert_array_equal(Y_UP.frame, np.eye(3))
+    tilted = Y_UP.turned_by(TURNS["askew"])
+    np.testing.assert_allclose(TURNS["askew"] @ tilted.frame, np.eye(3), atol=1e-15)
 
 
 def test_painted_vertices_and_markers_go_with_what_is_joined():

@@ -61,6 +61,8 @@ FACE = 3.0
 # How far what is flat may lean, and be off what is below, in radians.
 FLAT = np.pi / 18
 TILTED = np.pi / 5
+# How far the rotations of axes to one another are off whole numbers.
+WHOLE_TURN = 1e-6
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,25 @@ class SceneAxes:
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     viewer: tuple[float, float, float] = (0.0, -1.0, 0.0)
 
+    @property
+    def frame(self) -> np.ndarray:
+        """What positions (n,3) are to be multiplied by to stand as `Y_UP` does; 0 and 1 alone where that will do."""
+        up = unit(np.array(self.up, float))
+        viewer = unit(np.array(self.viewer, float) - (up @ self.viewer) * up)
+        rotation = np.column_stack([np.cross(up, viewer), up, viewer])
+        # Matrices of objects are in single precision.
+        whole = np.rint(rotation)
+        return whole if np.abs(rotation - whole).max() < WHOLE_TURN else rotation
+
+    def turned_by(self, rotation: np.ndarray) -> SceneAxes:
+        """The axes of positions (n,3) that were multiplied by a rotation (3,3)."""
+        x, y, z = (np.array([self.up, self.viewer], float) @ rotation).T.tolist()
+        return SceneAxes((x[0], y[0], z[0]), (x[1], y[1], z[1]))
+
 
 Z_UP = SceneAxes()
+# Of files whose coordinates are taken as they are, in formats in which Y is up by custom, and of `SceneAxes.frame`.
+Y_UP = SceneAxes(up=(0.0, 1.0, 0.0), viewer=(0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)

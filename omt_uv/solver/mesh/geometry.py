@@ -155,6 +155,11 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.where(length > 0, length, 1)
 
 
+def turned_by(points: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Points (n,3) times axes (3,3); what is in one place stays so, as it would not in products of matrices."""
+    return points[:, :1] * axes[0] + points[:, 1:2] * axes[1] + points[:, 2:] * axes[2]
+
+
 def plane_axes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors (m,3) in the planes of triangles of corners (m,3,3): along the first side, and across it."""
     side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

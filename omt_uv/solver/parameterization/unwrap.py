@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.density import Target
-from ..analysis.facing import SceneAxes
+from ..analysis.facing import Y_UP, SceneAxes
 from ..analysis.seam_costs import SeamPreferences, seam_costs
 from ..canonical.markers import MapMarkers, markers_of_chart
 from ..cutting.cuts import Cuts, SeamFinder
@@ -19,6 +19,7 @@ from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural, without_room
 from ..mesh.charts import Chart
+from ..mesh.geometry import turned_by
 from ..mesh.surface import Surface
 from ..mesh.topology import first_places
 from ..progress import Progress, Steps, part_of
@@ -277,8 +278,10 @@ def predicted_cuts(
 
     faces (f,) bool : polygons of the surface; axes : how it stands in the scene; options and errors: see `cuts.cut`
     """
+    if axes is not None:
+        surface = replace(surface, positions=turned_by(surface.positions, axes.frame))
     if bound:
-        shear = ShearBound(bound, preferences=SeamPreferences(axes=axes))
+        shear = ShearBound(bound, preferences=SeamPreferences(axes=None if axes is None else Y_UP))
         search = ShearSearch(surface, faces, shear, None, {}, rehearsal(UnwrapOptions()))
         options |= {"search": search.search(search.first_spread())}
     cuts = cut_surface(surface, faces, **options)

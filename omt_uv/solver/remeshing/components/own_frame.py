@@ -14,7 +14,7 @@ import numpy as np
 
 from ...analysis.order_of_places import lowest_first, order_of_places, own_axes
 from ...errors import MeshError
-from ...mesh.geometry import bounding_box
+from ...mesh.geometry import bounding_box, turned_by
 
 # Places are multiples of this share of the extent: more than what turning and moving a mesh rounds, far less than the
 # last digit of single precision.
@@ -87,7 +87,7 @@ def in_own_frame(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarr
     box_centre, box_size = bounding_box(points)
     axes = own_axes(points)
     axes = np.eye(3) if axes is None else axes
-    turned = _turned(points / box_size - box_centre / box_size, axes)
+    turned = turned_by(points / box_size - box_centre / box_size, axes)
     centre, size = bounding_box(turned)
     triangles, turn = lowest_first(place[triangles])
     rows = np.lexsort(triangles.T[::-1])
@@ -130,8 +130,3 @@ def _numbered(pairs: np.ndarray, used: np.ndarray) -> np.ndarray:
     found = np.sort(number[pairs], axis=1)
     found = found[(found >= 0).all(axis=1)]
     return found[np.lexsort(found.T[::-1])]
-
-
-def _turned(points: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Points (n,3) along axes (3,3); what is in one place stays so, as it would not in products of matrices."""
-    return points[:, :1] * axes[0] + points[:, 1:2] * axes[1] + points[:, 2:] * axes[2]
