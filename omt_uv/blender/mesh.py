@@ -85,7 +85,9 @@ def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:
 
 
 def _stretched(positions: np.ndarray, obj: bpy.types.Object) -> np.ndarray:
-    return positions.astype(float) @ stretch(obj)
+    # A loose vertex that is nowhere stays so, and is no reason to warn.
+    with np.errstate(invalid="ignore"):
+        return positions.astype(float) @ stretch(obj)
 
 
 def stretch(obj: bpy.types.Object) -> np.ndarray:

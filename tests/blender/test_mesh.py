@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import fields
 
 import bpy
@@ -45,6 +46,19 @@ def test_the_stretch_keeps_all_lengths_and_no_rotation(blender_mesh):
     obj.matrix_world = turn
     bpy.context.view_layer.update()
     assert (blender_mesh.stretch(obj) == np.eye(3)).all()
+
+
+def test_a_loose_vertex_that_is_nowhere_is_no_reason_to_warn(blender_mesh):
+    obj = scenes.cube()
+    obj.data.vertices.add(1)
+    places = np.append(np.array([v.co[:] for v in obj.data.vertices[:-1]]), [np.inf, 0, 1])
+    obj.data.vertices.foreach_set("co", places)
+    obj.rotation_euler = (0.3, 0.4, 0.5)
+    bpy.context.view_layer.update()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        positions = blender_mesh.read(obj).surface.positions
+    assert np.isfinite(positions[:-1]).all() and not np.isfinite(positions[-1]).all()
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])

@@ -1,5 +1,6 @@
 """Many objects unwrapped at once."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -130,6 +131,15 @@ def test_what_a_file_calls_up_is_all_one(turn, max_shear):
     every = np.ones(len(F), bool)
     cuts = [predicted_cuts(j.surface, every, max_shear, j.axes).edges for j in (UnwrapJob(surface, axes=Y_UP), job)]
     np.testing.assert_array_equal(*cuts)
+
+
+def test_a_loose_vertex_that_is_nowhere_is_no_reason_to_warn():
+    V, F = meshes.bumpy(4, 4)
+    surface = triangle_surface(np.concatenate([V, [[np.inf, 0, 1]]]), F)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        layout = drain(lay_out([UnwrapJob(surface)], Settings()))
+    assert layout.maps[0].maps[0].folds == 0 and not layout.warnings
 
 
 def test_axes_in_single_precision_turn_nothing_askew():

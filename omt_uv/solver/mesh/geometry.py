@@ -156,8 +156,10 @@ def unit(v: np.ndarray) -> np.ndarray:
 
 
 def turned_by(points: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Points (n,3) times axes (3,3); what is in one place stays so, as it would not in products of matrices."""
-    return points[:, :1] * axes[0] + points[:, 1:2] * axes[1] + points[:, 2:] * axes[2]
+    """Points (n,3) times axes (3,3); what is in one place stays so, as it would not in products of matrices, and what
+    is nowhere does, too."""
+    with np.errstate(invalid="ignore"):
+        return points[:, :1] * axes[0] + points[:, 1:2] * axes[1] + points[:, 2:] * axes[2]
 
 
 def plane_axes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
