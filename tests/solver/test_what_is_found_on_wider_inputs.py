@@ -3,9 +3,10 @@
 As `test_what_holds_of_every_function`, whose table has public functions on small meshes alone: `found_wider.tsv` has
 three figures of what each function finds in its first calls of every run of `wider_runs`, `seldom_runs` and
 `rare_runs`, and of private ones in those of `solver_runs`. So a bound or a weight within a function, and a branch that
-is taken from a size on, is seen by what it changes. OMT_UV_ACCEPT=1 writes the table anew, without what the last digits
-of the input decide; OMT_UV_ACCEPT=fewer leaves out what does not hold here, to be called once with every
-OPENBLAS_CORETYPE.
+is taken from a size on, is seen by what it changes. `came.tsv` has what comes of the first calls of each with one thing
+in what it was given changed, as `other_input` does, so that what no run comes to is seen as well. OMT_UV_ACCEPT=1
+writes the tables anew, without what the last digits of the input decide; OMT_UV_ACCEPT=fewer leaves out what does not
+hold here, to be called once with every OPENBLAS_CORETYPE.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from pathlib import Path
 
 import meshes
 import numpy as np
+import other_input
+import pytest
 import rare_runs
 import recorded_calls
 import seldom_runs
@@ -28,6 +31,8 @@ import wider_runs
 from omt_uv import solver
 
 FOUND = Path(__file__).with_name("found_wider.tsv")
+# What comes of calls with one thing in what they were given changed.
+CAME = Path(__file__).with_name("came.tsv")
 ACCEPT = os.environ.get("OMT_UV_ACCEPT", "")
 # Calls of each function in a run whose figures are kept.
 MOST = 6
@@ -50,11 +55,11 @@ def _forget():
 
 
 def told():
-    """Figures of what functions give in all runs, by their names."""
+    """The record of all runs: figures of what functions give, by their names, and calls of them."""
     _forget()
-    record = recorded_calls.Told(MOST)
+    record = other_input.Asked(MOST)
     everything = [*recorded_calls.modules(), solver]
-    watched = recorded_calls.watching(record, everything, private=True, callers=(seldom_runs, rare_runs))
+    watched = recorded_calls.watching(record, everything, private=True, callers=(seldom_runs, rare_runs), held=True)
     with watched, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name, run in wider_runs.RUNS.items():
@@ -70,7 +75,7 @@ def told():
             if name not in LEFT_OUT:
                 record.next_run(SMALL + " of symmetric meshes" * (name in ("with_symmetry", "bodies_cut_open")))
                 run()
-    return record.figures
+    return record
 
 
 def _shaken(seed, value):
@@ -93,7 +98,7 @@ def _shaking(seed, function):
 
 
 def shaken(seed, monkeypatch):
-    """Figures of the same runs on meshes that differ in the tenth digit."""
+    """The record of the same runs on meshes that differ in the tenth digit."""
     with monkeypatch.context() as patch:
         for module, names in (
             (wider_runs, ("bent", "curved", "wavy_quads", "wavy_mixed", "with_limbs", "broken_mesh")),
@@ -107,14 +112,25 @@ def shaken(seed, monkeypatch):
         others = {name: _shaking(seed, getattr(meshes, name)) for name in names}
         for module in (wider_runs, rare_runs):
             patch.setattr(module, "meshes", types.SimpleNamespace(**{**vars(meshes), **others}))
-        figures = told()
+        record = told()
     _forget()
-    return figures
+    return record
 
 
 @functools.cache
-def rows():
+def record():
     return told()
+
+
+def rows():
+    return record().figures
+
+
+@functools.cache
+def others():
+    """Records of the same runs on meshes that differ in the tenth digit, three times."""
+    with pytest.MonkeyPatch.context() as patch:
+        return [shaken(seed, patch) for seed in (1, 2, 3)]
 
 
 def test_nearly_all_functions_are_seen():
@@ -124,16 +140,30 @@ def test_nearly_all_functions_are_seen():
     assert len(missing) < (1 - MOST_OF_ALL) * len(names), (len(names), missing)
 
 
-def test_what_is_found_on_wider_inputs_is_that_of_the_table(monkeypatch):
+def test_what_is_found_on_wider_inputs_is_that_of_the_table():
     # Public functions on small meshes have a table of their own.
     here = {name: row for name, row in rows().items() if SMALL not in name or "._" in name}
     if ACCEPT == "1":
-        lines = recorded_calls.lines_of(here, [shaken(seed, monkeypatch) for seed in (1, 2, 3)])
+        lines = recorded_calls.lines_of(here, [other.figures for other in others()])
         FOUND.write_text("".join(f"{line}\n" for line in lines))
-    lines = FOUND.read_text().splitlines()
+    _hold(FOUND, here)
+
+
+def _hold(table, here):
+    """Rows are those of a table."""
+    lines = table.read_text().splitlines()
     other = list(recorded_calls.unlike(lines, here))
     if ACCEPT == "fewer":
-        FOUND.write_text("".join(f"{line}\n" for line in lines if line not in other))
+        table.write_text("".join(f"{line}\n" for line in lines if line not in other))
         return
     now = [f"{line} is now {here.get(line.split(chr(9))[0])}" for line in other]
     assert not other, "\n".join([*now, "OMT_UV_ACCEPT=1 accepts this"])
+
+
+def test_what_comes_of_other_input_is_that_of_the_table():
+    calls = record().calls
+    if ACCEPT == "1":
+        here = other_input.quick_rows(calls)
+        near = [other_input.rows_for(list(here), other.calls) for other in others()]
+        CAME.write_text("".join(f"{line}\n" for line in recorded_calls.lines_of(here, near)))
+    _hold(CAME, other_input.rows_for(CAME.read_text().splitlines(), calls))

@@ -29,6 +29,8 @@ SAMPLED = 20_000
 HUGE = 1e100
 # How truth values, whole and complex numbers count beside others, so that one in place of another shows.
 KINDS = {"b": 0.11, "i": 0.07, "u": 0.17, "c": 0.05}
+# So far objects in objects are looked into.
+DEEP = 5
 # What Blender calls by itself, and counts the arguments of.
 CALLED_BY_BLENDER = {"cancel", "check", "description", "draw", "execute", "invoke", "modal", "poll", "draw_header",
                      "draw_header_preset"}  # fmt: skip
@@ -107,6 +109,25 @@ def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndar
         yield from leaves(value, depth)
 
 
+def opened(value, depth: int = 0):
+    """A value in which objects, and what dataclasses keep for themselves, stand as all that they hold; None if there
+    is neither."""
+    if isinstance(value, (tuple, list)) and depth < DEEP:
+        inside = [opened(item, depth + 1) for item in value]
+        return inside if any(item is not None for item in inside) else None
+    if isinstance(value, dict) and depth < DEEP:
+        inside = [opened(item, depth + 1) for item in value.values()]
+        return inside if any(item is not None for item in inside) else None
+    if isinstance(value, (type, Enum)) or not type(value).__module__.startswith(omt_uv.__name__) or depth == DEEP:
+        return None
+    all_held = getattr(value, "__dict__", {}).items()
+    if dataclasses.is_dataclass(value):
+        own = {key: item for key, item in all_held if key.startswith("_")}
+        further = opened([item for key, item in all_held if not key.startswith("_")], depth + 1)
+        return [own, further] if own or further else None
+    return {key: [item, opened(item, depth + 1)] for key, item in all_held if key != "seconds"}
+
+
 def figures(found) -> np.ndarray:
     """Two figures of arrays: of their sizes, shapes and kinds of numbers, and of where in them what lies."""
     size = place = 0.0
@@ -182,6 +203,38 @@ def _public(module, private: bool = False) -> Iterator[tuple[str, Any, str, Call
                     yield f"{short}.{name}.{method}", value, method, found
 
 
+def _held(module) -> Iterator[tuple[str, type, str, Any, Callable, Callable]]:
+    """Of what classes of a module compute when it is asked for, of their functions that need no object, and of how
+    their objects begin: names, owners, attributes, what stands there, functions, and what makes such of a function."""
+    short = module.__name__.removeprefix(solver.__name__ + ".").removeprefix(omt_uv.__name__ + ".")
+    for name, owner in sorted(vars(module).items()):
+        if not inspect.isclass(owner) or owner.__module__ != module.__name__:
+            continue
+        for attribute, found in sorted(vars(owner).items()):
+            if isinstance(found, property) and found.fget is not None:
+                function, made = found.fget, found.getter
+            elif isinstance(found, functools.cached_property):
+                function, made = found.func, functools.partial(_cached_again, owner, attribute)
+            elif isinstance(found, (staticmethod, classmethod)):
+                function, made = found.__func__, type(found)
+            elif attribute in ("__init__", "__post_init__") and inspect.isfunction(found):
+                function, made = found, _as_it_is
+            else:
+                continue
+            if getattr(function, "__code__", None) and function.__code__.co_filename == module.__file__:
+                yield f"{short}.{name}.{attribute}", owner, attribute, found, function, made
+
+
+def _cached_again(owner: type, attribute: str, function: Callable) -> functools.cached_property:
+    made = functools.cached_property(function)
+    made.__set_name__(owner, attribute)
+    return made
+
+
+def _as_it_is(function: Callable) -> Callable:
+    return function
+
+
 class Record:
     """The first call of every function in each run, in which calls arguments were changed, and figures of all."""
 
@@ -219,13 +272,21 @@ class Record:
         """What a call tells before its end, and why it breaks off, is not kept."""
 
 
+# So many calls of a function in a run are looked into for what objects hold then.
+OPENED = 2
+# What stands behind names of what is left in objects.
+KEPT = " kept"
+
+
 class Told(Record):
-    """Figures of what comes of the first calls of every function in each run, and how many there are."""
+    """Figures of what comes of the first calls of every function in each run, and how many there are; of what objects
+    hold then as well, if they are to be opened."""
 
     errors = False
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, open: bool = False) -> None:
         super().__init__(most)
+        self.open = open
         self.figures: dict[str, np.ndarray] = {}
         self._calls: dict[str, int] = {}
         self._mark = ""
@@ -242,7 +303,11 @@ class Told(Record):
     def end(self, call: Call | None, args: tuple, kwargs: dict, result, is_method: bool) -> None:
         """Add the figures of what came of a call."""
         if call is not None and not inspect.isgenerator(result):
+            left = [result, args] if result is None or is_method else [result]
             self.add(call.name + self._mark, [result, args] if result is None else result, call.args[0])
+            kept = opened(left) if self.open and call.args[0] <= OPENED else None
+            if kept is not None:
+                self.add(call.name + self._mark + KEPT, kept, call.args[0])
 
     def add(self, name: str, value, k: int = 1) -> None:
         """Add the figures of a value to those of a name."""
@@ -368,9 +433,11 @@ def recorded(most: int = 1) -> Iterator[Record]:
 
 
 @contextmanager
-def watching(record: Record, everything: list, private: bool = False, callers: tuple = ()) -> Iterator[None]:
+def watching(
+    record: Record, everything: list, private: bool = False, callers: tuple = (), held: bool = False
+) -> Iterator[None]:
     """A context in which a record hears of all calls of public functions and methods of modules, or of private ones,
-    too, by each other and by other modules, `callers`."""
+    too, or of what classes compute when asked, by each other and by other modules, `callers`."""
     before, watched = [], {}
     forget(everything)
     for module in everything:
@@ -380,6 +447,9 @@ def watching(record: Record, everything: list, private: bool = False, callers: t
             else:
                 before.append((owner, attribute, function))
                 setattr(owner, attribute, _watched(record, name, function, True))
+        for name, owner, attribute, there, function, made in _held(module) if held else ():
+            before.append((owner, attribute, there))
+            setattr(owner, attribute, made(_watched(record, name, function, not isinstance(there, staticmethod))))
     for module in [*everything, *callers]:
         for attribute, value in list(vars(module).items()):
             if _is_one_of(value, watched):
