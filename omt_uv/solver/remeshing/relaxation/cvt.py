@@ -48,7 +48,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
     descent = LBFGS()
     best, residual = np.inf, 0.0
     normal = vertex_normals(mesh.points, triangles)
-    carrier.search_again()
+    carrier.begin_at(mesh.points, normal, mesh.near)
     points, density = carrier.closest(mesh.points, normal)
     points[fixed] = mesh.points[fixed]
     for k in range(rounds):
@@ -75,7 +75,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
         yield Progress("Relaxation", (k + 1) / rounds)
     if mesh.delaunay:
         make_delaunay_embedded(points, triangles, twin, mesh.locked)
-    return mesh.turned_into(points, triangles, twin), residual
+    return mesh.turned_into(points, triangles, twin, near=carrier.faces), residual
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray, fixed: np.ndarray) -> np.ndarray:
