@@ -22,6 +22,8 @@ CANDIDATES = 4
 FEW_CANDIDATES = 2
 # Squared share of the spacing within which a point is on a surface.
 ON_SURFACE = 1e-12
+# Cosine between the normals from which on it is on the right side of a thin part.
+SAME_SIDE = 0.5
 # So many pitches of samples from the nearest, half of the samples in each direction tell about where it is as well.
 FAR = 12.0
 # Samples so few are searched for any point.
@@ -175,11 +177,12 @@ class ClosestPoint:
 
     def at_or_near(self, points: np.ndarray, normals: np.ndarray, near: np.ndarray | None) -> SurfacePoints:
         """As a call, for points most of which lie on the surface, about at triangles `near` (k,) where these are given:
-        only the others are searched for."""
+        only the others are searched for, and those on what may be the wrong side."""
         if near is None:
             return self(points, normals)
         found = self.walk(points, near)
-        off = np.flatnonzero(_square(found.points - points) > ON_SURFACE * self.spacing**2)
+        side = np.einsum("kj,kj->k", self.normals.take(found.faces, axis=0), normals)
+        off = np.flatnonzero((_square(found.points - points) > ON_SURFACE * self.spacing**2) | (side < SAME_SIDE))
         _put(found, off, self(points[off], normals[off]))
         return found
 
