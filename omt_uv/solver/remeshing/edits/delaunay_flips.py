@@ -64,7 +64,7 @@ def make_delaunay_embedded(
 def flip_if_valid(
     points: np.ndarray, triangles: np.ndarray, h: np.ndarray, keep: np.ndarray, outer: np.ndarray
 ) -> np.ndarray:
-    """Flip interior halfedges h (k,), no two of which share a triangle, overwriting triangles (m,3); keys of new edges.
+    """Flip interior halfedges h (k,), no two of which share a triangle, in place in triangles (m,3); keys of new edges.
 
     Not those of `keep` (3m,) bool, nor where a face would fold, or vertices be joined that are so already, or that both
     are `outer` (n,) bool. The keys are sorted.
