@@ -65,12 +65,15 @@ def test_a_fit_ends_where_no_moves_are_left(works, rounds, delaunay, monkeypatch
             steps.append(len(steps) < works)
             return steps[-1]
 
-    for name in ("Pairing", "ClosestPointTracker", "join_samples", "area_samples", "tip_samples"):
+    for name in ("Pairing", "join_samples", "area_samples", "tip_samples"):
         monkeypatch.setattr(fit, name, lambda *_: None)
+    monkeypatch.setattr(fit, "ClosestPointTracker", lambda *_, start: None)
+    monkeypatch.setattr(fit, "vertex_normals", lambda points, triangles: None)
     monkeypatch.setattr(fit, "FitState", State)
     monkeypatch.setattr(fit, "lower_peaks", lambda state: done("lowered", 0.5, 1.0))
-    mesh = SimpleNamespace(points=np.zeros((4, 3)), delaunay=delaunay)
-    found, fractions = told(fit.fit_to_surface(mesh, None, None))
+    mesh = SimpleNamespace(points=np.zeros((4, 3)), triangles=None, near=None, delaunay=delaunay)
+    index = SimpleNamespace(at_or_near=lambda *_: SimpleNamespace(faces=None))
+    found, fractions = told(fit.fit_to_surface(mesh, index, None))
     rounds = 5 if rounds is None else rounds
     assert found == ("lowered" if delaunay else mesh)
     own = [0.6 * (k + 1) / 5 for k in range(rounds)]

@@ -16,8 +16,14 @@ from scipy.spatial import cKDTree
 from .geometry import face_normals, lengths, of_corners
 from .topology import twins
 
-# Samples whose faces are tried for a query.
+# Samples whose faces are tried for a query,
 CANDIDATES = 4
+# and where walks go on from time to time, so that few that begin at the wrong one do not matter.
+FEW_CANDIDATES = 2
+# Squared share of the spacing within which a point is on a surface.
+ON_SURFACE = 1e-12
+# Cosine between the normals from which on it is on the right side of a thin part.
+SAME_SIDE = 0.5
 # So many pitches of samples from the nearest, half of the samples in each direction tell about where it is as well.
 FAR = 12.0
 # Samples so few are searched for any point.
@@ -105,9 +111,17 @@ def _square(a: np.ndarray) -> np.ndarray:
 class ClosestPoint:
     """Closest points on a mesh (n,3), (m,3); queries are expected about `spacing` apart."""
 
-    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, spacing: float, twin: np.ndarray | None = None):
-        """With the `twins` (3m,) of the triangles where they are known."""
-        self.vertices, self.triangles = vertices, triangles
+    def __init__(
+        self,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        spacing: float,
+        twin: np.ndarray | None = None,
+        even: bool = False,
+    ):
+        """With the `twins` (3m,) of the triangles where they are known; where these are `even`, with sides of about the
+        spacing, their middles tell where they are."""
+        self.vertices, self.triangles, self.even = vertices, triangles, even
         self.normals = face_normals(vertices, triangles)
         a, b, c = (vertices.T.take(corner, axis=1) for corner in triangles.T)
         self._a, self._ab, self._ac = a, b - a, c - a
@@ -119,10 +133,10 @@ class ClosestPoint:
         self.normal_scale = 0.5 * spacing
         self.spacing = spacing
 
-    def __call__(self, points: np.ndarray, normals: np.ndarray) -> SurfacePoints:
+    def __call__(self, points: np.ndarray, normals: np.ndarray, candidates: int = CANDIDATES) -> SurfacePoints:
         """Closest points to points (k,3) where the surface looks about the way of normals (k,3)."""
         owner, _ = self._spread
-        k = min(CANDIDATES, len(owner))
+        k = min(candidates, len(owner))
         _, index = self._tree.query(np.column_stack([points, self.normal_scale * normals]), k=k)
         faces = owner[index.reshape(len(points), k)]
         _, distance = self.distance(points, faces)
@@ -134,6 +148,8 @@ class ClosestPoint:
     # Walks need no trees, so these come when they are first asked for.
     @cached_property
     def _spread(self) -> tuple[np.ndarray, np.ndarray]:
+        if self.even:
+            return np.arange(len(self.triangles)), (self._a + (self._ab + self._ac) / 3).T
         return spread_points(self.vertices, self.triangles, PITCH * self.spacing)
 
     @cached_property
@@ -158,6 +174,17 @@ class ClosestPoint:
             owner, samples = owner[first], samples[first]
             levels.append((owner, cKDTree(samples), pitch))
         return levels
+
+    def at_or_near(self, points: np.ndarray, normals: np.ndarray, near: np.ndarray | None) -> SurfacePoints:
+        """As a call, for points most of which lie on the surface, about at triangles `near` (k,) where these are given:
+        only the others are searched for, and those on what may be the wrong side."""
+        if near is None:
+            return self(points, normals)
+        found = self.walk(points, near)
+        side = np.einsum("kj,kj->k", self.normals.take(found.faces, axis=0), normals)
+        off = np.flatnonzero((_square(found.points - points) > ON_SURFACE * self.spacing**2) | (side < SAME_SIDE))
+        _put(found, off, self(points[off], normals[off]))
+        return found
 
     def closer(self, points: np.ndarray, normals: np.ndarray, found: SurfacePoints) -> SurfacePoints:
         """What was found for points (k,3) with normals (k,3), or the nearest by position where that is nearer, and does
@@ -257,9 +284,11 @@ class ClosestPointTracker:
     answer on it is a few steps, but these may end in a nearest point that is not the nearest of all, so that every few
     calls there is a search, for those farther than `far` times the root of the mean square."""
 
-    def __init__(self, search_every: int, far: float = 0.0, start: np.ndarray | None = None):
+    def __init__(
+        self, search_every: int, far: float = 0.0, start: np.ndarray | None = None, candidates: int = CANDIDATES
+    ):
         """With the triangles (k,) of a `start` there is no search at first."""
-        self.search_every, self.far = search_every, far
+        self.search_every, self.far, self.candidates = search_every, far, candidates
         self.faces = start
         self._calls = 0 if start is None else 1
 
@@ -267,7 +296,7 @@ class ClosestPointTracker:
         """As `ClosestPoint.__call__` of an index, whose triangles have the numbers of the last one's."""
         again = self._calls % self.search_every == 0
         if self.faces is None or (again and self.far == 0):
-            found = index(points, normals)
+            found = index(points, normals, self.candidates)
         else:
             found = index.walk(points, self.faces)
             if again:
@@ -283,8 +312,13 @@ def _search_again(
     square = _square(found.points - points)
     mine = np.flatnonzero(square > far**2 * square.sum() / max(len(square), 1))
     other = index.closer(points[mine], normals[mine], SurfacePoints(*(part[mine] for part in vars(found).values())))
+    _put(found, mine, other)
+
+
+def _put(found: SurfacePoints, rows: np.ndarray, other: SurfacePoints) -> None:
+    """Overwrite rows (k,) of what was found by what else was."""
     for whole, part in zip(vars(found).values(), vars(other).values(), strict=True):
-        whole[mine] = part
+        whole[rows] = part
 
 
 def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:

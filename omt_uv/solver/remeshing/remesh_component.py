@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.closest_point import ClosestPoint
+from ..mesh.closest_point import ClosestPoint, SurfacePoints
 from ..mesh.geometry import vertex_normals
 from ..progress import Steps, part_of
 from .components.coincident_boundaries import reopened
@@ -89,7 +89,7 @@ def _settled(
         mesh = retreated(mesh, fitted, component.vertices, component.triangles)
     points, triangles = reopened(mesh.points, mesh.triangles, start.to_reopen)
     thin = _too_thin(component, points, start.size / np.sqrt(level))
-    on = index(points, vertex_normals(points, triangles))
+    on = _on_surface(index, mesh, points, triangles)
     return RemeshedComponent(
         points=points - component.shift[on.faces],
         triangles=triangles,
@@ -98,6 +98,15 @@ def _settled(
         residual=residual,
         warnings=(*start.warnings, *thin),
     )
+
+
+def _on_surface(index: ClosestPoint, mesh: WorkingMesh, points: np.ndarray, triangles: np.ndarray) -> SurfacePoints:
+    """The closest points to points (k,3) of triangles (m,3), those of a mesh that may have been cut open."""
+    if mesh.near is None:
+        return index(points, vertex_normals(points, triangles))
+    near = np.zeros(len(points), np.int64)
+    near[triangles] = mesh.near[mesh.triangles]
+    return index.walk(points, near)
 
 
 def _too_thin(component: Component, points: np.ndarray, edge: np.ndarray) -> list[str]:

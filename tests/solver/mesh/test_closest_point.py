@@ -125,3 +125,20 @@ def test_points_of_a_pattern_come_triangle_by_triangle(count):
     corners, places = rng.random((3, count, 3)), subdivision_centroids(3)
     expected = [place @ corners[:, triangle] for triangle in range(count) for place in places]
     np.testing.assert_allclose(points_in(corners, places), np.reshape(expected, (-1, 3)), atol=1e-15)
+
+
+def test_middles_of_even_triangles_tell_where_these_are():
+    """A sample each, and with two candidates nearly all that the search with more of both finds."""
+    V, F = meshes.icosphere(3)
+    index, even = ClosestPoint(V, F, 0.1), ClosestPoint(V, F, 0.1, even=True)
+    owner, middles = even._spread
+    np.testing.assert_array_equal(owner, np.arange(len(F)))
+    np.testing.assert_allclose(middles, V[F].mean(axis=1))
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(2000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    points *= rng.uniform(0.95, 1.05, (2000, 1))
+    exact = distances(V, F, points)
+    found = np.linalg.norm(even(points, points, 2).points - points, axis=1)
+    assert (found <= exact + 1e-9).mean() > 0.99 and (found >= exact - 1e-9).all()
+    assert len(even._spread[0]) < len(index._spread[0])

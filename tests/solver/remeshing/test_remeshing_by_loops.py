@@ -130,8 +130,10 @@ def test_steps_go_along_the_surface_and_no_farther_than_a_share_of_the_sides_aro
     for v in range(len(V)):
         np.testing.assert_allclose(along[v], 0 if fixed[v] else step[v] - (step[v] @ normal[v]) * normal[v], atol=1e-12)
     step[3] *= 1e-3
-    found, mean = cvt._bounded(step, V, F)
-    shortest = {t: min(np.linalg.norm(V[F[t, k]] - V[F[t, k - 1]]) for k in range(3)) for t in range(len(F))}
+    shortest = voronoi_cells.voronoi_cells(V, F, np.ones(len(V))).shortest
+    expected = [min(np.linalg.norm(V[F[t, k]] - V[F[t, k - 1]]) for k in range(3)) for t in range(len(F))]
+    np.testing.assert_allclose(shortest, expected)
+    found, mean = cvt._bounded(step, shortest, F)
     total = []
     for v in range(len(V)):
         most = min(0.4 * shortest[t] for t in range(len(F)) if v in F[t])
@@ -147,7 +149,7 @@ def test_cells_are_corrected_by_the_share_in_which_samples_are_trusted():
     n, points = 6, rng.normal(size=(6, 3))
     share = np.array([0, 0.3, 1, 0, 0.5, 1.0])
     mass, centroid, crest, far = rng.random(n), rng.normal(size=(n, 3)), rng.random(n), rng.normal(size=(n, 3))
-    cells = voronoi_cells.VoronoiCells(rng.random(n), rng.normal(size=(n, 3)), 7.0)
+    cells = voronoi_cells.VoronoiCells(rng.random(n), rng.normal(size=(n, 3)), 7.0, rng.random(4))
     found = cvt.SampleCorrection(share, mass, centroid, crest, far).correct(points, cells)
     energy = 7.0
     for v in range(n):
@@ -156,7 +158,7 @@ def test_cells_are_corrected_by_the_share_in_which_samples_are_trusted():
         moment = (1 - b) * cells.moment[v] + b * mass[v] * (centroid[v] - points[v]) + crest[v] * (far[v] - points[v])
         np.testing.assert_allclose(found.moment[v], moment)
         energy += crest[v] * ((far[v] - points[v]) ** 2).sum()
-    assert found.energy == pytest.approx(energy)
+    assert found.energy == pytest.approx(energy) and found.shortest is cells.shortest
 
 
 def test_samples_are_trusted_where_they_see_more_than_the_mesh_covers():
@@ -245,9 +247,21 @@ def test_the_largest_of_the_triangles_around_and_what_that_leaves_of_centroids()
     np.testing.assert_allclose(share, expected)
 
 
-def test_rows_are_summed_by_place():
-    place, rows = np.array([0, 2, 0, 2, 2]), np.arange(10.0).reshape(5, 2)
-    np.testing.assert_allclose(least_squares._summed(place, rows, 4), [[4, 6], [0, 0], [16, 19], [0, 0]])
+def test_entries_of_pairs_are_summed_by_triangle():
+    rng, m, q = np.random.default_rng(0), 5, 3
+    faces = np.concatenate([rng.integers(0, m, 20), np.repeat(np.arange(m), q), rng.integers(0, m, 7)])
+    bary = rng.dirichlet(np.ones(3), len(faces))
+    bary[20 : 20 + m * q] = np.tile(bary[:q], (m, 1))
+    pairs = SimpleNamespace(faces=faces, barycentric=bary, sample_count=20, place_count=m * q)
+    entries = rng.normal(size=(2, len(faces)))
+    expected = np.zeros((2, 2, 6, m))
+    for k in range(20 + m * q):
+        products = [bary[k, i] * bary[k, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))]
+        expected[0, :, :, faces[k]] += np.outer(entries[:, k], products)
+        expected[1, :, :3, faces[k]] += np.outer(entries[:, k], bary[k])
+    for found, sums in zip((least_squares._corner_products, np.ascontiguousarray), expected, strict=True):
+        found = least_squares._sums_by_triangle(m, pairs, entries, found)
+        np.testing.assert_allclose(found, sums[:, : len(found[0])])
 
 
 def test_the_highest_come_first_and_so_many_edges_apart():

@@ -96,10 +96,13 @@ def test_vertices_are_carried_in_turns_until_they_are_balanced(balances, carried
 
 @pytest.mark.parametrize("rounds", [0, 3])
 @pytest.mark.parametrize("fit", [True, False])
-def test_a_first_mesh_is_relaxed_brought_to_its_count_and_fitted(fit, rounds, monkeypatch):
+@pytest.mark.parametrize("near", [True, False])
+def test_a_first_mesh_is_relaxed_brought_to_its_count_and_fitted(near, fit, rounds, monkeypatch):
     V, F = meshes.grid(2, 2)
     calls = []
-    mesh = SimpleNamespace(points=V, triangles=F)
+    at = np.zeros(9, np.int64)
+    at[F] = np.arange(8)[:, None]
+    mesh = SimpleNamespace(points=V, triangles=F, near=at if near else None)
 
     def step(name, value):
         def taking(*words):

@@ -64,7 +64,7 @@ def make_delaunay_embedded(
 def flip_if_valid(
     points: np.ndarray, triangles: np.ndarray, h: np.ndarray, keep: np.ndarray, outer: np.ndarray
 ) -> np.ndarray:
-    """Flip interior halfedges h (k,), no two of which share a triangle, overwriting triangles (m,3); keys of new edges.
+    """Flip interior halfedges h (k,), no two of which share a triangle, in place in triangles (m,3); keys of new edges.
 
     Not those of `keep` (3m,) bool, nor where a face would fold, or vertices be joined that are so already, or that both
     are `outer` (n,) bool. The keys are sorted.
@@ -99,13 +99,14 @@ def _is_in(keys: np.ndarray, ordered: np.ndarray) -> np.ndarray:
 def _cotangents(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Cotangents (m,3) of the angles opposite to the halfedges."""
     p = np.take(points.T, triangles.T, axis=1)
-    # Coordinates first, then halfedges: (3,3,m).
-    e = p[:, [1, 2, 0]] - p
-    a, b = e[:, 0], e[:, 1]
+    # Coordinates first.
+    sides = a, b, _ = p[:, 1] - p[:, 0], p[:, 2] - p[:, 1], p[:, 0] - p[:, 2]
     x, y, z = (a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1)))
     double = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-300)
-    # The two other sides meet opposite to each, one of them pointing away.
-    return -(np.einsum("ikm,ikm->mk", e[:, [1, 2, 0]], e[:, [2, 0, 1]]) / double[:, None])
+    squares = [x * x + y * y + z * z for x, y, z in sides]
+    # The law of cosines: the two other sides meet opposite to each.
+    half = (squares[0] + squares[1] + squares[2]) / 2
+    return np.stack([(half - square) / double for square in squares], axis=1)
 
 
 def _unfolded(points, i, j, k, far) -> np.ndarray:

@@ -166,4 +166,8 @@ def after_edit(mesh: WorkingMesh, edit: Edit) -> WorkingMesh:
     triangles, twin = edit.triangles.copy(), edit.twin.copy()
     if mesh.delaunay:
         make_delaunay_embedded(edit.points, triangles, twin, mesh.locked, FLIP_ROUNDS)
-    return mesh.turned_into(edit.points, triangles, twin, fixed)
+    near = None
+    if mesh.near is not None:
+        # A new vertex, of which there are the last ones, is about where an end of its edge is.
+        near = np.append(mesh.near[edit.origin[edit.origin >= 0]], mesh.near[edit.split_ends[:, 0]])
+    return mesh.turned_into(edit.points, triangles, twin, fixed, near)

@@ -15,7 +15,8 @@ class WorkingMesh:
     """A mesh in the making: points (n,3), triangles (m,3).
 
     fixed (n,) bool: vertices that stay, which come first; locked: sorted keys (`topology.pair_keys`) of edges that
-    stay; delaunay: whether edges flip to Delaunay as vertices move
+    stay; delaunay: whether edges flip to Delaunay as vertices move; near (n,): a triangle of the surface about at every
+    vertex, where these are known, so that closest points need not be searched for
     """
 
     points: np.ndarray
@@ -23,6 +24,7 @@ class WorkingMesh:
     fixed: np.ndarray
     locked: np.ndarray
     delaunay: bool = True
+    near: np.ndarray | None = None
 
     @cached_property
     def twin(self) -> np.ndarray:
@@ -30,10 +32,16 @@ class WorkingMesh:
         return twins(self.triangles)
 
     def turned_into(
-        self, points: np.ndarray, triangles: np.ndarray, twin: np.ndarray, fixed: np.ndarray | None = None
+        self,
+        points: np.ndarray,
+        triangles: np.ndarray,
+        twin: np.ndarray,
+        fixed: np.ndarray | None = None,
+        near: np.ndarray | None = None,
     ) -> WorkingMesh:
         """This mesh with other points (n,3) and triangles (m,3), whose opposite halfedges (3m,) are known, and other
-        vertices that stay, (n,) bool, if there are others."""
-        mesh = replace(self, points=points, triangles=triangles, fixed=self.fixed if fixed is None else fixed)
+        vertices that stay, (n,) bool, if there are others; and where on the surface they are (n,), if that is known."""
+        fixed = self.fixed if fixed is None else fixed
+        mesh = replace(self, points=points, triangles=triangles, fixed=fixed, near=near)
         vars(mesh)["twin"] = twin
         return mesh

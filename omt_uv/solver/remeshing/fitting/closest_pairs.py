@@ -6,7 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, points_in, subdivision_centroids
+from ...mesh.closest_point import (
+    FEW_CANDIDATES,
+    ClosestPoint,
+    ClosestPointTracker,
+    SurfacePoints,
+    points_in,
+    subdivision_centroids,
+)
 from ...mesh.geometry import face_areas
 from ...mesh.topology import expand
 from ..relaxation.surface_samples import SurfaceSamples
@@ -95,7 +102,9 @@ class Pairing:
 
     def __init__(self, index: ClosestPoint, samples: SurfaceSamples, start: PairingStart | None = None):
         self.index, self.samples = index, samples
-        self._on_mesh, self._on_surface = ClosestPointTracker(SEARCH_EVERY, FAR), ClosestPointTracker(SEARCH_EVERY, FAR)
+        self._on_mesh, self._on_surface = (
+            ClosestPointTracker(SEARCH_EVERY, FAR, candidates=FEW_CANDIDATES) for _ in range(2)
+        )
         self.area_per_vertex: tuple[float, float] | None = None
         self._patch: np.ndarray | None = None
         self.places = start.places if start else PLACES
@@ -135,7 +144,7 @@ class Pairing:
         on (n,3): the closest points of the vertices; twin (3m,): opposite halfedges, where they are known
         """
         samples, n, area = self.samples, len(points), face_areas(points, triangles)
-        mesh = ClosestPoint(points, triangles, self.index.spacing, twin)
+        mesh = ClosestPoint(points, triangles, self.index.spacing, twin, even=True)
         near = self._on_mesh(mesh, samples.points, samples.normals)
         if self._patch is not None:
             self._search_patch(mesh, self._patch, near)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mesh.closest_point import ClosestPoint, ClosestPointTracker
+from ...mesh.geometry import vertex_normals
 from ...progress import Progress, Steps, part_of
 from ..edits.working_mesh import WorkingMesh
 from ..relaxation.surface_samples import area_samples, join_samples, tip_samples
@@ -30,7 +31,8 @@ def fit_to_surface(mesh: WorkingMesh, index: ClosestPoint, density: np.ndarray) 
     """
     n = len(mesh.points)
     samples = join_samples(area_samples(index, SAMPLES * n, density), tip_samples(index, n))
-    state = FitState(mesh, Pairing(index, samples), density, ClosestPointTracker(ROUNDS + 1))
+    near = index.at_or_near(mesh.points, vertex_normals(mesh.points, mesh.triangles), mesh.near).faces
+    state = FitState(mesh, Pairing(index, samples), density, ClosestPointTracker(ROUNDS + 2, start=near))
     for k in range(ROUNDS):
         if not state.step():
             break

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, ClosestPointTracker
+from ...mesh.closest_point import FEW_CANDIDATES, ClosestPoint, ClosestPointTracker
 from ...mesh.geometry import vertex_normals
 from ...mesh.topology import twins
 from ..edits.delaunay_flips import make_delaunay_embedded
@@ -62,7 +62,7 @@ class FitState:
     @property
     def mesh(self) -> WorkingMesh:
         """The mesh as it is now."""
-        return self.start.turned_into(self.points, self.triangles, self.twin)
+        return self.start.turned_into(self.points, self.triangles, self.twin, near=self.on.faces)
 
     def pairs(self) -> ClosestPairs:
         """Pair closest points of mesh and surface."""
@@ -101,9 +101,9 @@ class FitState:
 
     def add_samples(self, extra: SurfaceSamples, places: np.ndarray) -> None:
         """Pair more samples of the surface from now on, and these places (r,3) of the mesh's triangles."""
-        mesh = ClosestPoint(self.points, self.triangles, self.index.spacing, self.twin)
+        mesh = ClosestPoint(self.points, self.triangles, self.index.spacing, self.twin, even=True)
         start = PairingStart(
-            mesh_faces=np.append(self.pairing.mesh_faces, mesh(extra.points, extra.normals).faces),
+            mesh_faces=np.append(self.pairing.mesh_faces, mesh(extra.points, extra.normals, FEW_CANDIDATES).faces),
             surface_faces=self.pairing.surface_faces_for(places),
             area_per_vertex=self.pairing.area_per_vertex,
             places=places,

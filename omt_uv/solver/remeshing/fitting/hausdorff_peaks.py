@@ -108,6 +108,9 @@ def look_closer(state: FitState, distance: np.ndarray, far: float, most_rings: i
     near[T[samples.faces[distance[:s] > far]]] = True
     pitch, edge = np.sqrt(samples.area.sum() / s), np.sqrt(face_areas(V, T).sum() / len(T))
     near = within_rings(T, near, min(int(np.ceil(SPREAD * pitch / edge)), most_rings))
+    # Tips, and those around what was looked at before, are samples already.
+    corners = T[samples.faces]
+    near[corners[(V[corners] == samples.points[:, None]).all(axis=2)]] = False
     at, corner = np.flatnonzero(near), np.zeros(len(V), np.int64)
     corner[T.ravel()] = np.arange(T.size)
     normals = vertex_normals(V, T)[at]

@@ -6,6 +6,7 @@ Stuetzle 1993; distances along lines, as in Chen, Medioni 1992).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +36,7 @@ EASY = 6.0
 # and down to this share.
 EASIEST = 0.05
 # Relative residual of the moves.
-TOLERANCE = 1e-6
+TOLERANCE = 1e-4
 # Where the entries of a symmetric matrix (3,3) are in a list of the six that differ.
 SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
 
@@ -95,28 +96,45 @@ def _distances(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of the pairs' squared distances, the blocks (n,3,3) of their matrix on the diagonal and (3m,3,3) at halfedges,
     and the right side (n,3)."""
-    m, flat = len(triangles), triangles.ravel()
     direction = pairs.offset / np.maximum(pairs.distance, 1e-300)[:, None]
     near = np.flatnonzero(pairs.distance < weighting.close)
     direction[near] = normals[pairs.faces[near]]
     weight = pairs.weight * (1 + np.minimum(pairs.distance / (FAR * weighting.rms), FARTHEST) ** 2)
     off = weight * np.einsum("ki,ki->k", direction, pairs.offset)
-    b, u = np.ascontiguousarray(pairs.barycentric.T), np.ascontiguousarray(direction.T)
-    squares = [weight * u[i] * u[j] for i in range(3) for j in range(i, 3)]
+    u = np.ascontiguousarray(direction.T)
+    # Of every pair the entries of its square, and its pull.
+    entries = [weight * u[i] * u[j] for i in range(3) for j in range(i, 3)]
+    square = _sums_by_triangle(len(triangles), pairs, entries, _corner_products)
+    pull = _sums_by_triangle(len(triangles), pairs, off * u, np.ascontiguousarray)
+    flat, own = triangles.ravel(), slice(pairs.sample_count + pairs.place_count, None)
+    # A vertex pulls at itself alone, and has one pair, in the order of vertices.
+    corners = [np.bincount(flat, a[:3].T.ravel(), n) + entry[own] for a, entry in zip(square, entries, strict=True)]
+    right = [np.bincount(flat, a.T.ravel(), n) + entry[own] for a, entry in zip(pull, off * u, strict=True)]
+    between = np.stack([a[3:].T.ravel() for a in square], axis=1)
+    return np.stack(corners, axis=1)[:, SYMMETRIC], between[:, SYMMETRIC], np.stack(right, axis=1)
 
-    def blocks(c, d):
-        product = b[c] * b[d]
-        return np.stack([np.bincount(pairs.faces, product * q, m) for q in squares], axis=1)[:, SYMMETRIC]
 
-    corners = np.stack([blocks(c, c) for c in range(3)], axis=1).reshape(-1, 9)
-    between = np.stack([blocks(c, (c + 1) % 3) for c in range(3)], axis=1).reshape(-1, 3, 3)
-    pulls = [np.bincount(pairs.faces, off * b[c] * u[i], m) for c in range(3) for i in range(3)]
-    return _summed(flat, corners, n).reshape(n, 3, 3), between, _summed(flat, np.stack(pulls, 1).reshape(-1, 3), n)
+def _corner_products(b: np.ndarray) -> np.ndarray:
+    """Products (6,k) of barycentric coordinates (3,k): of each corner's with itself, and with the next one's."""
+    return np.concatenate([b * b, b * b[[1, 2, 0]]])
 
 
-def _summed(place: np.ndarray, rows: np.ndarray, n: int) -> np.ndarray:
-    """Sums (n,c) of rows (k,c) by their places (k,)."""
-    return np.stack([np.bincount(place, column, n) for column in rows.T], axis=1)
+def _sums_by_triangle(
+    m: int, pairs: ClosestPairs, entries: Iterable[np.ndarray], factors: Callable[[np.ndarray], np.ndarray]
+) -> list[np.ndarray]:
+    """Of every one of the entries (k,) of the pairs, but for those of vertices, sums (p,m) over each of m triangles,
+    times p `factors` that are made of barycentric coordinates (3,k)."""
+    s, q = pairs.sample_count, pairs.place_count
+    face, weights = pairs.faces[:s], factors(pairs.barycentric[:s].T)
+    # All triangles have pairs at the same places.
+    places = factors(pairs.barycentric[s : s + q // m].T)
+    found = []
+    for entry in entries:
+        sums = places @ entry[s : s + q].reshape(m, -1).T
+        for k, weight in enumerate(weights):
+            sums[k] += np.bincount(face, weight * entry[:s], m)
+        found.append(sums)
+    return found
 
 
 def _matrix(triangles: np.ndarray, twin: np.ndarray, diagonal: np.ndarray, between: np.ndarray) -> sp.bsr_matrix:

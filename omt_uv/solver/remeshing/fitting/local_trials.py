@@ -189,7 +189,7 @@ def acceptable(before: PatchShapes, after: PatchShapes) -> np.ndarray:
 def put_best_back(
     batch: TrialBatch, trial: FitState, after: ClosestPairs, pairs: ClosestPairs, best: np.ndarray
 ) -> None:
-    """Overwrite patches of a mesh, and its pairs, by those copies that are the best, (p,), -1 for none."""
+    """Overwrite patches of a mesh, and its pairs, in place by those copies that are the best, (p,), -1 for none."""
     whole, patches, peaks = batch.whole, batch.patches, batch.peaks
     v, f, s = len(patches.vertices), len(patches.faces), len(peaks.samples)
     faces, vertices = np.flatnonzero(best[patches.of_face] >= 0), np.flatnonzero(best[patches.of_vertex] >= 0)

@@ -48,7 +48,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
     descent = LBFGS()
     best, residual = np.inf, 0.0
     normal = vertex_normals(mesh.points, triangles)
-    carrier.search_again()
+    carrier.begin_at(mesh.points, normal, mesh.near)
     points, density = carrier.closest(mesh.points, normal)
     points[fixed] = mesh.points[fixed]
     for k in range(rounds):
@@ -64,7 +64,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
         gradient = _tangential(-2 * cells.moment, normal, fixed)
         step = descent.direction(points, gradient, 1 / (2 * np.maximum(cells.mass, 1e-300))[:, None])
         step = _tangential(step, normal, fixed)
-        step, residual = _bounded(step, points, triangles)
+        step, residual = _bounded(step, cells.shortest, triangles)
         trial = points + step
         normal = vertex_normals(trial, triangles)
         if k % RETURN_EVERY == 0 or k == rounds - 1:
@@ -75,7 +75,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
         yield Progress("Relaxation", (k + 1) / rounds)
     if mesh.delaunay:
         make_delaunay_embedded(points, triangles, twin, mesh.locked)
-    return mesh.turned_into(points, triangles, twin), residual
+    return mesh.turned_into(points, triangles, twin, near=carrier.faces), residual
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -108,6 +108,7 @@ class SampleCorrection:
             (1 - b) * cells.mass + b * self.mass + self.crest_mass,
             moment + self.crest_mass[:, None] * to_crest,
             cells.energy + float(self.crest_mass @ np.einsum("ij,ij->i", to_crest, to_crest)),
+            cells.shortest,
         )
 
 
@@ -136,16 +137,14 @@ def _sample_correction(
     )
 
 
-def _bounded(step: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, float]:
-    """Steps (n,3) no longer than MAX_STEP of the shortest side of a triangle around, and their mean in such sides."""
+def _bounded(step: np.ndarray, shortest: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, float]:
+    """Steps (n,3) no longer than MAX_STEP of the shortest side (m,) of a triangle around, and their mean in such
+    sides."""
     size = np.sqrt(np.einsum("ij,ij->i", step, step))
-    p = np.take(points.T, triangles.T, axis=1)
-    x, y, z = p - p[:, [1, 2, 0]]
-    shortest = np.sqrt(np.minimum.reduce(x * x + y * y + z * z))
     shortest = np.maximum(shortest, 1e-6 * shortest.mean())
     share = MAX_STEP * shortest / np.maximum(size.take(triangles.T), 1e-300)
     corner, far = np.nonzero(share < 1)
-    least = np.ones(len(points))
+    least = np.ones(len(step))
     np.minimum.at(least, triangles[far, corner], share[corner, far])
     step = np.nan_to_num(least[:, None] * step, posinf=0.0, neginf=0.0)
     return step, float(np.mean((least * size).take(triangles.T) / shortest))

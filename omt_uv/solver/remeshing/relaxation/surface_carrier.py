@@ -35,9 +35,16 @@ class SurfaceCarrier:
         self._crests = crest_samples(index)
         self._memory = ClosestPointTracker(SEARCH_EVERY)
 
-    def search_again(self) -> None:
-        """Search for the next points from the start: they are others than the last ones."""
-        self._memory = ClosestPointTracker(SEARCH_EVERY)
+    def begin_at(self, points: np.ndarray, normals: np.ndarray, near: np.ndarray | None) -> None:
+        """Begin with points (k,3) with normals (k,3), others than the last ones, about at triangles `near` (k,), where
+        these are known."""
+        found = self.index.at_or_near(points, normals, near)
+        self._memory = ClosestPointTracker(SEARCH_EVERY, start=found.faces)
+
+    @property
+    def faces(self) -> np.ndarray:
+        """The triangle (k,) of each of the last closest points."""
+        return np.asarray(self._memory.faces)
 
     def closest(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Closest points (k,3) to points (k,3) with normals (k,3), and the density there (k,).

@@ -16,11 +16,13 @@ MIN_SHARE = 0.2
 
 @dataclass(frozen=True)
 class VoronoiCells:
-    """Mass (n,), first moment about the vertex (n,3) and energy of the Voronoi cells."""
+    """Mass (n,), first moment about the vertex (n,3) and energy of the Voronoi cells, and the shortest side of every
+    triangle (m,)."""
 
     mass: np.ndarray
     moment: np.ndarray
     energy: float
+    shortest: np.ndarray
 
 
 def voronoi_cells(
@@ -68,7 +70,10 @@ def voronoi_cells(
     typical = np.bincount(flat, np.tile(double / 6 * middle, 3), n)
     cells = np.bincount(flat, mass.ravel(), n)
     return VoronoiCells(
-        np.maximum(cells, np.maximum(MIN_SHARE * typical, 1e-9 * typical.mean())), np.stack(sums, axis=1), energy
+        np.maximum(cells, np.maximum(MIN_SHARE * typical, 1e-9 * typical.mean())),
+        np.stack(sums, axis=1),
+        energy,
+        np.sqrt(np.minimum.reduce(square)),
     )
 
 

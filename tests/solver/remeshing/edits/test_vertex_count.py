@@ -90,3 +90,17 @@ def test_bounds_are_those_of_topology(name, vertices):
     (component,) = split_components(*getattr(meshes, name)(), np.zeros((0, 2), int)).components
     assert min_vertex_count(component) == vertices
     assert min_face_count(component, vertices) == {"icosphere": 4, "torus": 14, "bumpy": 1, "annulus": 6}[name]
+
+
+def test_edits_know_where_on_the_surface_vertices_are():
+    """Those that stay where they were, new ones where an end of their edge was."""
+    V, F = meshes.icosphere(2)
+    mesh = WorkingMesh(V, F, np.zeros(len(V), dtype=bool), NONE, near=np.arange(len(V)))
+    fewer, more = (reach_vertex_count(mesh, count, lambda points: np.ones(len(points))) for count in (120, 200))
+    for found in (fewer, more):
+        assert len(found.near) == len(found.points)
+        # Vertices at one end of an edge of the mesh that was.
+        far = np.linalg.norm(V[found.near] - found.points, axis=1)
+        assert far.max() < 0.7 and (far == 0).mean() > 0.5
+    np.testing.assert_array_equal(more.near[: len(V)], np.arange(len(V)))
+    assert reach_vertex_count(WorkingMesh(V, F, mesh.fixed, NONE), 120, lambda p: np.ones(len(p))).near is None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing import RemeshOptions, RemeshSource, remesh
 from omt_uv.solver.remeshing.fitting import hausdorff_peaks as peaks
 from omt_uv.solver.remeshing.fitting.ring_patches import cut_patches, spaced_faces, within_rings
+from omt_uv.solver.remeshing.relaxation.surface_samples import area_samples, join_samples, tip_samples
 
 FEW_ROUNDS = RemeshOptions(rounds=5)
 
@@ -123,3 +126,30 @@ def test_patches_are_disjoint_and_know_their_ring(rings):
     assert set(patches.vertices[~patches.outer]) == set(np.flatnonzero(within_rings(F, core, rings)))
     open_ = twins(patches.triangles) < 0
     assert patches.outer[patches.triangles.ravel()[open_]].all()
+
+
+def test_no_vertex_of_the_surface_is_a_sample_twice():
+    """Not when looked at again, nor a tip."""
+    V, F = groove()
+    index = ClosestPoint(V, F, 0.05)
+    samples = join_samples(area_samples(index, 900, np.ones(len(F))), tip_samples(index, 50))
+    distance = np.zeros(len(samples.points))
+    distance[::900] = 1
+    distance[-1] = 1
+    asked = []
+
+    class State:
+        def __init__(self):
+            self.index, self.pairing = index, SimpleNamespace(samples=samples)
+
+        def add_samples(self, extra, places):
+            asked.append(len(extra.points))
+            self.pairing.samples = join_samples(self.pairing.samples, extra)
+
+    state = State()
+    for rings in (3, 6):
+        peaks.look_closer(state, distance, 0.5, rings, peaks.DENSE)
+        distance = np.append(distance, np.zeros(asked[-1]))
+    found = state.pairing.samples.points
+    assert min(asked) > 0 and len(found) == len(samples.points) + sum(asked)
+    assert len(np.unique(found, axis=0)) == len(found)

@@ -13,11 +13,16 @@ from omt_uv.solver.remeshing.fitting.least_squares import DistanceWeighting, dis
 
 
 def some_pairs(V, F, k=400):
+    """Pairs of k samples, of two places in every triangle, and of all vertices, as `Pairing` has them."""
     rng = np.random.default_rng(4)
-    offset, bary = rng.standard_normal((k, 3)), rng.dirichlet(np.ones(3), k)
-    return ClosestPairs(
-        rng.integers(0, len(F), k), bary, offset, np.linalg.norm(offset, axis=1), np.full(k, len(V) / k), k, 0
-    )
+    corner = np.zeros(len(V), np.int64)
+    corner[F.ravel()] = np.arange(F.size)
+    places = np.array([[0.5, 0.3, 0.2], [0.1, 0.2, 0.7]])
+    faces = np.concatenate([rng.integers(0, len(F), k), np.repeat(np.arange(len(F)), 2), corner // 3])
+    bary = np.concatenate([rng.dirichlet(np.ones(3), k), np.tile(places, (len(F), 1)), np.eye(3)[corner % 3]])
+    offset = rng.standard_normal((len(faces), 3))
+    weight = rng.uniform(0.5, 1.5, len(faces)) * len(V) / len(faces)
+    return ClosestPairs(faces, bary, offset, np.linalg.norm(offset, axis=1), weight, k, 2 * len(F))
 
 
 def test_moves_are_those_of_the_dense_problem(monkeypatch):
@@ -26,6 +31,7 @@ def test_moves_are_those_of_the_dense_problem(monkeypatch):
     n, pairs = len(V), some_pairs(V, F)
     monkeypatch.setattr(least_squares, "CENTROID", 0.0)
     monkeypatch.setattr(least_squares, "FAIRNESS", 0.0)
+    monkeypatch.setattr(least_squares, "TOLERANCE", 1e-9)
     monkeypatch.setattr(least_squares, "smallness", lambda points, triangles: np.zeros(len(triangles)))
     fixed = np.arange(n) < 3
     rms = pairs.rms
@@ -43,7 +49,14 @@ def test_moves_are_those_of_the_dense_problem(monkeypatch):
     A, b = (rows.T @ rows + 1e-3 * np.eye(3 * n)), rows.T @ right
     expected = np.zeros(3 * n)
     expected[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
-    assert np.abs(found.ravel() - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(found.ravel() - expected).max() < 1e-7 * np.abs(expected).max()
+    # One of several steps, after each of which closest points are others, need not be exact.
+    monkeypatch.undo()
+    monkeypatch.setattr(least_squares, "CENTROID", 0.0)
+    monkeypatch.setattr(least_squares, "FAIRNESS", 0.0)
+    monkeypatch.setattr(least_squares, "smallness", lambda points, triangles: np.zeros(len(triangles)))
+    found = displacements(V, F, twins(F), fixed, pairs, np.zeros((n, 3)), DistanceWeighting(0.1, rms))
+    assert np.abs(found.ravel() - expected).max() < 1e-3 * np.abs(expected).max()
 
 
 def test_fixed_vertices_stay():

@@ -38,6 +38,30 @@ def test_closest_points_are_on_the_surface_with_its_density(carrier):
         assert np.abs(np.linalg.norm(found, axis=1) - 1).max() < 0.01
         above = np.abs(P[:, 2]) > 0.1
         np.testing.assert_array_equal(density[above], np.where(P[above, 2] > 0, 1.5, 0.5))
-    carrier.search_again()
-    other, _ = carrier.closest(P[:5], P[:5])
-    assert other.shape == (5, 3)
+
+
+def test_points_on_the_surface_begin_where_they_are_and_only_others_are_searched_for(carrier, monkeypatch):
+    P, Q = meshes.icosphere(2)
+    normals = vertex_normals(P, Q)
+    on, _ = carrier.closest(P, normals)
+    faces = carrier.faces
+    asked = []
+    search = ClosestPoint.__call__
+
+    def counting(index, points, *words):
+        asked.append(len(points))
+        return search(index, points, *words)
+
+    monkeypatch.setattr(ClosestPoint, "__call__", counting)
+    # Some left the surface, and some of these are said to be on the far side.
+    points, near = on.copy(), faces.copy()
+    points[:7] *= 1.2
+    near[:3] = faces[::-1][:3]
+    carrier.begin_at(points, normals, near)
+    assert asked == [7]
+    np.testing.assert_array_equal(carrier.faces[7:], faces[7:])
+    found, _ = carrier.closest(points, normals)
+    np.testing.assert_allclose(found, search(carrier.index, points, normals).points, atol=1e-12)
+    assert asked == [7]
+    carrier.begin_at(points[:5], normals[:5], None)
+    assert asked == [7, 5] and len(carrier.faces) == 5

@@ -14,6 +14,7 @@ from omt_uv.solver.remeshing.relaxation.surface_samples import (
     area_samples,
     crest_samples,
     join_samples,
+    merged_samples,
     select_samples,
     sharpness,
     tip_samples,
@@ -111,3 +112,28 @@ def test_sharpness_is_the_same_by_gradients(monkeypatch):
     monkeypatch.setattr(surface_samples, "LARGE", 0)
     assert factored.max() > 0.01
     np.testing.assert_allclose(sharpness(index), factored, atol=1e-5)
+
+
+def test_samples_in_a_cube_that_look_the_same_way_are_merged_into_their_mean():
+    """As a thin plate has them: two sides, which stay apart."""
+    rng = np.random.default_rng(0)
+    side = np.repeat([1.0, -1.0], 300)
+    points = np.column_stack([rng.random((600, 2)), 0.01 * side + 0.5])
+    normals = np.column_stack([np.zeros((600, 2)), side])
+    samples = surface_samples.SurfaceSamples(points, normals, rng.random(600), np.arange(600))
+    found = merged_samples(samples, 0.25)
+    assert 2 * 16 <= len(found.area) <= 2 * 25
+    assert found.area.sum() == pytest.approx(samples.area.sum())
+    np.testing.assert_allclose(found.area @ found.points, samples.area @ points)
+    for way in (1, -1):
+        mine = found.normals[:, 2] == way
+        np.testing.assert_allclose(found.points[mine, 2], 0.5 + 0.01 * way)
+        assert found.area[mine].sum() == pytest.approx(samples.area[side == way].sum())
+    # Each has the triangle of one of those it is made of.
+    assert (np.abs(points[found.faces] - found.points).max(axis=1) < 0.25).all()
+    np.testing.assert_array_equal(side[found.faces], found.normals[:, 2])
+    # With cubes that hold one each nothing changes but the order.
+    same = merged_samples(samples, 1e-9)
+    order = np.argsort(same.faces)
+    np.testing.assert_allclose(same.points[order], points)
+    np.testing.assert_allclose(same.area[order], samples.area)
