@@ -49,7 +49,7 @@ MOST_OF_ALL = 0.85
 
 
 def _forget():
-    """Meshes that `solver_runs` has made for other tests are made again, and seen."""
+    """Meshes that `solver_runs` has made are made again by whoever asks next, and seen."""
     for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
         cached.cache_clear()
 
@@ -75,6 +75,7 @@ def told():
             if name not in LEFT_OUT:
                 record.next_run(SMALL + " of symmetric meshes" * (name in ("with_symmetry", "bodies_cut_open")))
                 run()
+    _forget()
     return record
 
 
@@ -112,9 +113,7 @@ def shaken(seed, monkeypatch):
         others = {name: _shaking(seed, getattr(meshes, name)) for name in names}
         for module in (wider_runs, rare_runs):
             patch.setattr(module, "meshes", types.SimpleNamespace(**{**vars(meshes), **others}))
-        record = told()
-    _forget()
-    return record
+        return told()
 
 
 @functools.cache
