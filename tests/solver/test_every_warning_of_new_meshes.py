@@ -157,10 +157,10 @@ def without_maps(patch):
 
 @says("solver/remeshing/remesh_component.py", "A part is thinner than the new triangles")
 def too_thin(patch):
-    """Boxes, and needles of which 20 vertices do not reach both ends."""
+    """Boxes, and needles of which a few vertices do not reach both ends."""
     V, F = meshes.cube()
     text = "A part is thinner than the new triangles and does not keep its shape. Ask for more, or remesh it by itself"
-    for thin, count, told in ((0.3, 20, []), (0.01, 20, [text]), (0.01, 40, [])):
+    for thin, count, told in ((0.3, 20, []), (0.003, 16, [text]), (0.02, 60, [])):
         yield remeshed(V * [1, thin, thin], F, count, rounds=4).warnings, told
 
 
