@@ -39,6 +39,8 @@ ROWS = {
         {"Shear": None, "Folded faces": ALL, "Islands": ALL},
     ),
 }
+# A percentile lies between two values of those that it is of, and of all between two others.
+BETWEEN = {"Angles, 99 %": 0.5}
 # What is said of one object alone.
 NAMED = {"volume", "points", "remesh"}
 
@@ -94,7 +96,8 @@ def test_rows_of_several_come_of_those_of_each(rows, name):
             values, found = [number(one[row]) for one in each], number(both[row])
             assert {unit(one[row]) for one in each} == {unit(both[row])}
             if way is None:
-                assert min(values) <= found <= max(values), (row, values, found)
+                room = BETWEEN.get(row, 0)
+                assert min(values) - room <= found <= max(values) + room, (row, values, found)
             else:
                 assert found == pytest.approx(way(values)), (row, values, found)
         if name in NAMED:
