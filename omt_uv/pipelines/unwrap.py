@@ -18,7 +18,7 @@ from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import signed_areas, turned_by
 from ..solver.mesh.repair import joined_vertices
-from ..solver.mesh.surface import side_ends, with_joined_vertices
+from ..solver.mesh.surface import side_ends, turned_surface, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
 from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.small_charts import SMALL
@@ -102,8 +102,7 @@ def lay_out(
 def _set_up(job: UnwrapJob) -> UnwrapJob:
     """The job with its surface turned so that Y is up: the same body gets the same cuts whatever its file calls up, for
     a search that branches tells roundings apart."""
-    positions = turned_by(job.surface.positions, job.axes.frame)
-    return replace(job, surface=replace(job.surface, positions=positions), axes=Y_UP)
+    return replace(job, surface=turned_surface(job.surface, job.axes.frame), axes=Y_UP)
 
 
 def _set_back(found: SurfaceMap, axes: SceneAxes) -> SurfaceMap:

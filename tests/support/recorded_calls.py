@@ -112,11 +112,9 @@ def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndar
 def opened(value, depth: int = 0):
     """A value in which objects, and what dataclasses keep for themselves, stand as all that they hold; None if there
     is neither."""
-    if isinstance(value, (tuple, list)) and depth < DEEP:
-        inside = [opened(item, depth + 1) for item in value]
-        return inside if any(item is not None for item in inside) else None
-    if isinstance(value, dict) and depth < DEEP:
-        inside = [opened(item, depth + 1) for item in value.values()]
+    if isinstance(value, (tuple, list, dict)) and depth < DEEP:
+        items = value.values() if isinstance(value, dict) else value
+        inside = [opened(item, depth + 1) for item in items]
         return inside if any(item is not None for item in inside) else None
     if isinstance(value, (type, Enum)) or not type(value).__module__.startswith(omt_uv.__name__) or depth == DEEP:
         return None

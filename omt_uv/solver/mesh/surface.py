@@ -17,7 +17,7 @@ from ..errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .geometry import cross3, lengths, of_corners, part_by_part
+from .geometry import cross3, lengths, of_corners, part_by_part, turned_by
 from .gluing import Gluing, polygon_gluing
 from .topology import are_among, distinct, next_corners, pair_keys, pair_up, row_labels
 
@@ -187,6 +187,11 @@ def with_joined_vertices(surface: Surface, same: np.ndarray) -> Surface:
     return replace(
         surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
     )
+
+
+def turned_surface(surface: Surface, axes: np.ndarray) -> Surface:
+    """The surface with its positions multiplied by a rotation (3,3)."""
+    return replace(surface, positions=turned_by(surface.positions, axes))
 
 
 def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:

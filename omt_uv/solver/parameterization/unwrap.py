@@ -19,8 +19,7 @@ from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural, without_room
 from ..mesh.charts import Chart
-from ..mesh.geometry import turned_by
-from ..mesh.surface import Surface
+from ..mesh.surface import Surface, turned_surface
 from ..mesh.topology import first_places
 from ..progress import Progress, Steps, part_of
 from ..quads.diagonals import cut_along_shorter
@@ -279,7 +278,7 @@ def predicted_cuts(
     faces (f,) bool : polygons of the surface; axes : how it stands in the scene; options and errors: see `cuts.cut`
     """
     if axes is not None:
-        surface = replace(surface, positions=turned_by(surface.positions, axes.frame))
+        surface = turned_surface(surface, axes.frame)
     if bound:
         shear = ShearBound(bound, preferences=SeamPreferences(axes=None if axes is None else Y_UP))
         search = ShearSearch(surface, faces, shear, None, {}, rehearsal(UnwrapOptions()))
