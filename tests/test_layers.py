@@ -39,7 +39,8 @@ ARROWS: dict[str, str] = {
     "solver.revolution": "solver solver.mesh solver.linalg",
     "solver.cutting": "solver solver.mesh solver.linalg solver.quads solver.analysis solver.maps solver.conformal "
     "solver.revolution",
-    "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.packing solver.cutting",
+    "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.packing solver.cutting "
+    "solver.revolution",
     "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",
     "solver.refinement": "solver solver.mesh solver.linalg solver.analysis solver.maps",
     "solver.subdivision": "solver solver.mesh solver.maps solver.refinement",
@@ -47,7 +48,7 @@ ARROWS: dict[str, str] = {
     "solver.conformal solver.canonical solver.refinement",
     "solver.parameterization": "solver solver.mesh solver.linalg solver.quads solver.analysis solver.maps "
     "solver.transport solver.cutting solver.seams solver.conformal solver.canonical solver.refinement "
-    "solver.parameterization.polygons",
+    "solver.revolution solver.parameterization.polygons",
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
     "solver.arranging": "solver solver.mesh",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",

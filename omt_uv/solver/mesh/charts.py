@@ -131,14 +131,30 @@ def _with_patches(chart: Chart) -> Chart:
 
 
 def part_of_chart(chart: Chart, rows: np.ndarray) -> tuple[Chart, np.ndarray]:
-    """The triangles `rows` (m,) bool of a chart without patches as a chart, and its vertices (k,) in the whole one."""
-    used, triangles = np.unique(chart.triangles[rows], return_inverse=True)
+    """The triangles `rows` (m,) bool of a chart as a chart, and its vertices (k,) in the whole one.
+
+    Patches of a hole go with what is all around it; one that has several parts around it stays open.
+    """
+    own = np.zeros(len(chart.vertices), dtype=bool)
+    own[chart.triangles[rows]] = True
+    patches = chart.patches
+    if len(patches):
+        hole = graph_components(patches[:, [0, 1]].ravel(), patches[:, [1, 2]].ravel(), len(own))[1]
+        of_others = np.zeros(len(own), dtype=bool)
+        of_others[chart.triangles] = True
+        of_others &= ~own
+        open_ = np.unique(hole[of_others])
+        patches = patches[~np.isin(hole[patches[:, 0]], open_)]
+    used, vertices = np.unique(np.concatenate([chart.triangles[rows], patches]), return_inverse=True)
+    vertices = vertices.reshape(-1, 3)
+    count = int(np.count_nonzero(rows))
     part = Chart(
         chart.vertices[used],
-        triangles.reshape(-1, 3),
+        vertices[:count],
         chart.corners[rows],
         chart.faces[rows],
         chart.vertex_ids[used],
+        vertices[count:],
     )
     return part, used
 

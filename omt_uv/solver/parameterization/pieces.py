@@ -128,7 +128,7 @@ def in_pieces(
     for chart, chart_map in zip(prepared.charts, maps, strict=True):
         found, between = ([chart], [chart_map]), cuts.edges[:0]
         # Most are compact, and of thousands nothing else is asked.
-        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0 and not len(chart.patches):
+        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0:
             was_cut = np.isin(outline(chart), pair_keys(*cuts.edges.T)).any()
             if was_cut and not is_marked(surface, chart):
                 found, between = yield from _pieces(search, chart, chart_map, whole, map_charts)

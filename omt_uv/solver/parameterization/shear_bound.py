@@ -320,11 +320,17 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
 def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound whose parts have cuts of their own, where these are shorter than what was cut of the
     whole before it came apart, and keep the bound, too."""
+    from ..revolution.axis import has_axis
+
+    def turns(chart: Chart) -> bool:
+        # What was turned was cut along rings, and shorter cuts of its pieces would be petals.
+        return has_axis(chart.vertices, chart.triangles, chart.faces)
+
     large = (last.area >= LARGE_PART * last.area.sum()) & (last.mean > UNSHEARED)
     parts = [
         k
         for k in np.flatnonzero(large & last.has_room).tolist()
-        if not (last.found_for(k) or search.is_thinned(last.charts[k]))
+        if not (last.found_for(k) or search.is_thinned(last.charts[k]) or turns(last.charts[k]))
         and (search.shear.further or not is_marked(search.surface, last.charts[k]))
     ]
     if len(last.charts) < 2 or not parts:

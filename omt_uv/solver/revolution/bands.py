@@ -26,6 +26,12 @@ def cheapest_bands(profile: Profile, price: np.ndarray, asked: float) -> np.ndar
     of the ratio of lengths around them; caps that are not slit for discs of the same area. The cheapest of all choices,
     by dynamic programming (Bellman 1957).
     """
+    return bands_and_cost(profile, price, asked)[0]
+
+
+def bands_and_cost(profile: Profile, price: np.ndarray, asked: float) -> tuple[np.ndarray, float]:
+    """What `cheapest_bands` gives, and what it costs over the side of a square with the area; infinite where no
+    choice keeps what is asked for."""
     r, s = profile.radius, profile.length
     # A needle has no radius, but no length around it to be off either.
     step, middle = np.diff(s), np.maximum((r[1:] + r[:-1]) / 2, NEEDLE * r.max())
@@ -40,7 +46,7 @@ def cheapest_bands(profile: Profile, price: np.ndarray, asked: float) -> np.ndar
         cost[0] = np.minimum(cost[0], _cost(_discs(area, middle), share[0], asked))
     if profile.poles[1]:
         cost[:, -1] = np.minimum(cost[:, -1], _cost(_discs(area[::-1], middle[::-1])[::-1], share[:, -1], asked))
-    ring = ISLAND + 2 * np.pi * r * price * (1 - CREASE * np.minimum(_turns(r, s) / (np.pi / 2), 1)) / side
+    ring = ISLAND + ring_lengths(r, price, _turns(r, s)) / side
     best, before = np.full(count, np.inf), np.zeros(count, np.int64)
     best[0] = 0.0
     for k in range(1, count):
@@ -49,12 +55,17 @@ def cheapest_bands(profile: Profile, price: np.ndarray, asked: float) -> np.ndar
         before[k] = np.argmax(ways <= (1 + EVEN) * ways.min())
         best[k] = ways.min()
     if not np.isfinite(best[-1]):
-        return np.zeros(0, np.int64)
+        return np.zeros(0, np.int64), np.inf
     found, k = list[int](), int(before[-1])
     while k > 0:
         found.append(k)
         k = int(before[k])
-    return np.array(found[::-1], np.int64)
+    return np.array(found[::-1], np.int64), float(best[-1])
+
+
+def ring_lengths(radius: np.ndarray, price: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """How long rings (k,) of such radii are as cuts, at a price per length, where the profile turns by such angles."""
+    return 2 * np.pi * radius * price * (1 - CREASE * np.minimum(turns / (np.pi / 2), 1))
 
 
 def _sectors(middle: np.ndarray, s: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -54,15 +54,30 @@ class Profile:
     poles: np.ndarray
 
 
+def harmonic_between(positions: np.ndarray, triangles: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """How far every vertex (n,) of a surface (n,3), (m,3) is from one of two sets of vertices, 0, to the other, 1, as a
+    harmonic function: the same all around a body that turns about an axis, if its ends are, and all across a band."""
+    length = halfedge_lengths(positions, triangles).reshape(-1, 3)
+    laplacian = laplacian_from_lengths(length, triangles, len(positions), LEAST_STIFFNESS)
+    along = np.zeros(len(positions))
+    along[other] = 1.0
+    inner = np.ones(len(along), dtype=bool)
+    inner[one] = inner[other] = False
+    inner = np.flatnonzero(inner)
+    if len(inner):
+        along[inner] = solve_spd(laplacian[inner][:, inner].tocsc(), -(laplacian[inner] @ along))
+    return along
+
+
 def profile_of(positions: np.ndarray, triangles: np.ndarray, axis: Axis) -> Profile | None:
     """The profile of a surface (n,3), (m,3) without handles that turns about an axis; None if it does not, or has fewer
     sides than what is smooth."""
     ends = _ends(positions, triangles, axis)
     if ends is None:
         return None
-    along = _between(positions, triangles, *ends[0])
+    along = harmonic_between(positions, triangles, *ends[0])
     radius, height = axis.radius(positions), axis.height(positions)
-    rows, row = _rows(triangles, radius, height)
+    rows, row = rows_of_vertices(triangles, radius, height)
     in_rows = IN_A_ROW * rows <= len(row)
     if in_rows:
         if np.median(np.bincount(row)) < LEAST_SIDES:
@@ -91,20 +106,6 @@ def profile_of(positions: np.ndarray, triangles: np.ndarray, axis: Axis) -> Prof
     return Profile(level, along, r, s, in_rows, ends[1])
 
 
-def _between(positions: np.ndarray, triangles: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How far every vertex (n,) is from one end to the other: harmonic, hence the same all around, as the ends are."""
-    length = halfedge_lengths(positions, triangles).reshape(-1, 3)
-    laplacian = laplacian_from_lengths(length, triangles, len(positions), LEAST_STIFFNESS)
-    along = np.zeros(len(positions))
-    along[other] = 1.0
-    inner = np.ones(len(along), dtype=bool)
-    inner[one] = inner[other] = False
-    inner = np.flatnonzero(inner)
-    if len(inner):
-        along[inner] = solve_spd(laplacian[inner][:, inner].tocsc(), -(laplacian[inner] @ along))
-    return along
-
-
 def _parts(along: np.ndarray) -> np.ndarray:
     """A part (n,) for vertices that are so far (n,) from one end to the other: about as many in each, in order, but
     both ends by themselves."""
@@ -116,7 +117,7 @@ def _parts(along: np.ndarray) -> np.ndarray:
     return np.unique(part, return_inverse=True)[1].ravel()
 
 
-def _rows(triangles: np.ndarray, radius: np.ndarray, height: np.ndarray) -> tuple[int, np.ndarray]:
+def rows_of_vertices(triangles: np.ndarray, radius: np.ndarray, height: np.ndarray) -> tuple[int, np.ndarray]:
     """The number of rows of vertices, and the row (n,) of each: edges join those at one place of the profile."""
     tail, head = halfedges(triangles)
     size = max(float(np.ptp(radius)), float(np.ptp(height)))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..linalg.minimum_cut import capacities, least_cut
+from ..mesh.topology import halfedges
 from .axis import axis_of_revolution
 from .bands import cheapest_bands
+from .closed_profile import ClosedProfile, cheapest_rings, closed_profile_of
 from .profile import Profile, profile_of
 
 # Where vertices are in no rows, a ring is the shortest within this share of the length of the profile, to either side.
@@ -31,9 +33,12 @@ def rings_of_edges(
     found = np.zeros(len(pair), dtype=bool)
     _, polygon = np.unique(polygon, return_inverse=True)
     axis = axis_of_revolution(positions, triangles, polygon.ravel())
-    turned = None if axis is None else profile_of(positions, triangles, axis)
-    if turned is None:
+    if axis is None:
         return found
+    turned = profile_of(positions, triangles, axis)
+    if turned is None:
+        closed = closed_profile_of(positions, triangles, axis)
+        return found if closed is None else _around(closed, triangles, pair, length, cost, asked)
     at = np.bincount(polygon, turned.along[triangles].mean(axis=1)) / np.bincount(polygon)
     joined = polygon[pair // 3]
     between = np.isfinite(cost) & (joined[:, 0] != joined[:, 1])
@@ -43,6 +48,20 @@ def rings_of_edges(
         side = _side(turned, k, at, joined, length)
         found[np.flatnonzero(between)[side[joined[:, 0]] != side[joined[:, 1]]]] = True
     return found
+
+
+def _around(
+    closed: ClosedProfile, triangles: np.ndarray, pair: np.ndarray, length: np.ndarray, cost: np.ndarray, asked: float
+) -> np.ndarray:
+    """Edges (e,) bool along the rows of a closed profile where a surface comes apart; see `rings_of_edges`."""
+    tail, head = halfedges(triangles)
+    row, other = closed.row[tail[pair[:, 0]]], closed.row[head[pair[:, 0]]]
+    within, count = row == other, len(closed.radius)
+    price = np.bincount(row[within], cost[within], count) / np.bincount(row[within], length[within], count)
+    # A row whose edges are not all there, or within polygons, closes no ring.
+    whole = np.bincount(row[within], minlength=count) == np.bincount(closed.row, minlength=count)
+    price = np.where(whole, price, np.inf)
+    return within & np.isin(row, cheapest_rings(closed, price, asked))
 
 
 def _price(before: np.ndarray, length: np.ndarray, cost: np.ndarray) -> float:

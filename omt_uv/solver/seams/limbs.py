@@ -17,10 +17,11 @@ from ..analysis.symmetry_plane import MirrorImages
 from ..linalg.minimum_cut import capacities
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
-from ..mesh.geometry import edge_lengths, face_areas
+from ..mesh.geometry import cotangent_laplacian, edge_lengths, face_areas
 from ..mesh.topology import pair_keys
 from ..packing.pack_square import pack
 from ..progress import drain
+from ..revolution.profile import harmonic_between
 from .options import COMPACT
 from .parting import (
     LEAST_PART,
@@ -43,6 +44,12 @@ PIECE = 1.2
 MOST_PIECES = 12
 # A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
 NEAR_CUT = 0.2
+# At the ends of that it costs so much more.
+OFF = 0.1
+# One that bends is as wide in so many stretches of it, but for that share of it at both ends, up to a factor.
+AS_WIDE = 1.5
+STRETCHES = 16
+ENDS = 0.2
 # What is up in space, (3,); None where nobody knows.
 Up = Sequence[float] | None
 # A chart sprawls where the whole surface fills less of the square around that chart; cuts are made where the pieces
@@ -108,14 +115,24 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
     middle = graph.places(chart, uv)
     middle -= graph.area @ middle / graph.area.sum()
     along = middle @ np.linalg.eigh(middle.T @ (graph.area[:, None] * middle))[1][:, 1]
+    cut = _across(graph, along, graph.prices(chart, cost), count)
+    return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
+
+
+def _across(graph: PolygonGraph, along: np.ndarray, price: np.ndarray, count: int) -> np.ndarray:
+    """The cheapest edges (e,) bool that part polygons, which are so far (p,) along a band, in `count` pieces about as
+    long as each other; price (e,) : what edges cost"""
     along = (along - along.min()) / max(np.ptp(along), 1e-300)
-    capacity, cut = capacities(graph.prices(chart, cost)), np.zeros(len(graph.joined), dtype=bool)
+    cut = np.zeros(len(graph.joined), dtype=bool)
     for k in range(1, count):
         before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
         if before.any() and after.any():
+            # Of cuts that cost the same the one where the pieces are as long.
+            off = np.abs(along[graph.joined].mean(axis=1) * count - k) / NEAR_CUT
+            capacity = capacities(price * (1 + OFF * np.minimum(off, 1)))
             side = minimum_cut(graph, capacity, np.flatnonzero(before), np.flatnonzero(after))
             cut |= graph.around(side)
-    return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
+    return cut
 
 
 def sprawls(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
@@ -133,7 +150,10 @@ def without_limbs(
     cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
     body = _Body.of(chart, uv, cost, up, images)
-    whole = cut = np.zeros(len(body.graph.joined), dtype=bool)
+    cut = body.across_bent_band(cost)
+    if cut.any():
+        return body.graph.pieces(~cut)[body.graph.polygon], chart.vertex_ids[body.graph.ends[cut]]
+    whole = cut
     boxes = body.boxes(cut)
     cuts, shares = [cut], [boxes.filled]
     while len(cuts) <= MOST_CUTS and shares[-1] < FULL:
@@ -257,6 +277,45 @@ class _Body:
         """What the pieces that a cut (e,) bool leaves fill of a square when they are packed."""
         charts, maps = self.pieces(cut)
         return drain(pack(maps, [chart.triangles for chart in charts], roughly=True)).coverage
+
+    def across_bent_band(self, cost: np.ndarray) -> np.ndarray:
+        """Edges (e,) bool across a chart in pieces about as long as each other, if it is a band that bends: as wide
+        everywhere, and longer than a square with its area; cost (n,) : see `parting.parted`."""
+        nothing = np.zeros(len(self.steps), dtype=bool)
+        at_vertex = self._from_end_to_end()
+        along = self.graph.places(self.chart, np.stack([at_vertex, at_vertex], axis=1))[:, 0]
+        order = np.argsort(along, kind="stable")
+        within = np.empty(len(order))
+        within[order] = np.cumsum(self.graph.area[order]) / self.whole
+        begin, end = np.interp([ENDS, 1 - ENDS], within[order], along[order])
+        level = np.linspace(begin, end, STRETCHES + 1)
+        # Where a band is wider, what is harmonic rises less, and every stretch of it has more area for that, too;
+        # between both ends it conducts as much as it is wide, over its length.
+        of_corners = at_vertex[self.chart.triangles]
+        low, high = of_corners.min(axis=1), of_corners.max(axis=1)
+        share = np.clip((level[:, None] - low) / np.maximum(high - low, 1e-300), 0, 1)
+        width = np.sqrt(np.diff(share @ face_areas(self.chart.vertices, self.chart.triangles)))
+        flow = float(at_vertex @ (cotangent_laplacian(self.uv, self.chart.disk) @ at_vertex))
+        long = 1 / np.sqrt(max((1 - ENDS) * flow, 1e-300))
+        if width.max() > AS_WIDE * width.min() or long <= LONG_AND_NARROW:
+            return nothing
+        price = self.graph.prices(self.chart, cost)
+        cut = _across(self.graph, within, price, min(int(np.ceil(long / PIECE)), MOST_PIECES))
+        return cut if self.packed(cut) >= FULLER * self.packed(nothing) else nothing
+
+    def _from_end_to_end(self) -> np.ndarray:
+        """How far vertices (n,) are from one end to the other: harmonic between those around two tips as far from each
+        other as can be."""
+        every = np.ones(len(self.graph.area), dtype=bool)
+        far = next(self._from_tips(every, np.ones(len(self.steps), dtype=bool)))
+        other = dijkstra(self.graph.matrix(self.steps), indices=int(np.argmax(far)))
+        ends = list[np.ndarray]()
+        for distance in (far, other):
+            order = np.argsort(distance, kind="stable")
+            end = order[: 1 + np.searchsorted(np.cumsum(self.graph.area[order]), ENDS / 2 * self.whole)]
+            ends.append(np.unique(self.chart.triangles[np.isin(self.graph.polygon, end)]))
+        # Across holes that are filled, too: the vertices in there hang on nothing else.
+        return harmonic_between(self.uv, self.chart.disk, *ends)
 
     def necks(self, cut: np.ndarray, images: MirrorImages | None) -> Iterator[np.ndarray]:
         """Edges (e,) bool across necks of the pieces that a cut (e,) bool leaves; images: see `parting.parted`."""

@@ -7,18 +7,16 @@ import meshes
 import numpy as np
 import polygons
 import pytest
+from turned import ASKED, ring_edges, somewhere
 
-from omt_uv.solver.mesh.geometry import nearest_rotations
-from omt_uv.solver.mesh.topology import graph_components, halfedges, twins
+from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.revolution.axis import PASSES, axis_of_revolution
 from omt_uv.solver.revolution.bands import CREASE, ISLAND, WORTH, cheapest_bands
 from omt_uv.solver.revolution.profile import LEAST_SIDES, MOST_LEVELS, Profile, profile_of
-from omt_uv.solver.revolution.rings import rings_of_edges
 
-ASKED = float(np.log(1.35) ** 2)
 # Distances from the axis, and heights.
 VASE = [(0, 0), (0.3, 0), (0.5, 0), (0.65, 0.25), (0.8, 0.5), (0.88, 0.8), (0.9, 1.1), (0.8, 1.5), (0.6, 1.8)]
 VASE += [(0.45, 2.0), (0.3, 2.2), (0.35, 2.5), (0.5, 2.6)]
@@ -33,29 +31,9 @@ BODIES = {
 }
 
 
-def somewhere(V, seed=0, size=7.0):
-    """Places (n,3) turned, moved and scaled, and where the axis is then."""
-    rng = np.random.default_rng(seed)
-    turn = nearest_rotations(rng.normal(size=(1, 3, 3)))[0]
-    return size * V @ turn.T + [3, -2, 5], turn[:, 2], np.array([3.0, -2, 5])
-
-
 def triangulated(name, sides=24, turn=0):
     V, P = bodies.turned(BODIES[name], sides)
     return V, *polygons.cut(P, turn)
-
-
-def ring_edges(V, F, owner, asked=ASKED, cost=None):
-    """Ends (r,2) of the rings of a surface."""
-    tail, head = halfedges(F)
-    twin = twins(F)
-    h = np.flatnonzero(twin > np.arange(len(twin)))
-    pair = np.stack([h, twin[h]], axis=1)
-    ends = np.stack([tail[h], head[h]], axis=1)
-    length = np.linalg.norm(V[ends[:, 0]] - V[ends[:, 1]], axis=1)
-    diagonal = owner[pair[:, 0] // 3] == owner[pair[:, 1] // 3]
-    cost = np.where(diagonal, np.inf, length if cost is None else cost(ends, length))
-    return ends[rings_of_edges(V, F, owner, pair, length, cost, asked)]
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import bodies
 import meshes
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from omt_uv.solver.analysis.symmetry_plane import MirrorImages
 from omt_uv.solver.mesh.charts import part_of_chart, strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -68,6 +70,38 @@ def test_a_part_that_keeps_all_else_small_may_come_apart():
     own, square = area_of(chart), np.ptp(uv, axis=0).max() ** 2
     assert own / MUCH < SPRAWLING * square
     assert may_come_apart(chart, uv, UP, 0.999 * own / MUCH) and not may_come_apart(chart, uv, UP, 1.001 * own / MUCH)
+
+
+def arc(turn=4.4, width=0.7, radius=2.0, along=60, across=8):
+    """A flat chart that goes around so far, upright in x and z, and its map."""
+    V, F = meshes.grid(along, across, width=1.0, height=1.0)
+    u, v = V[:, 0] / np.ptp(V[:, 0]), V[:, 1] / np.ptp(V[:, 1])
+    r = radius + width * (v - v.min() - 0.5)
+    angle = turn * (u - u.min())
+    points = np.stack([r * np.cos(angle), 0 * r, r * np.sin(angle)], axis=1)
+    (chart,) = strict_charts(triangle_surface(points, F))
+    return chart, chart.vertices[:, [0, 2]]
+
+
+@pytest.mark.parametrize("turn", [4.4, 5.6])
+def test_a_band_that_bends_is_cut_across_in_pieces_as_long(turn):
+    chart, uv = arc(turn)
+    piece, edges = without_limbs(chart, uv, np.ones(len(uv)), UP)
+    area = np.bincount(piece, face_areas(chart.vertices, chart.triangles))
+    assert len(area) in (2, 3, 4) and np.ptp(area) < 0.2 * area.mean()
+    # Straight across, as the cells are: one angle for each cut.
+    place = np.argsort(chart.vertex_ids)
+    z, x = uv[place[edges]].T[::-1]
+    assert len(edges) == 8 * (len(area) - 1) and np.abs(np.diff(np.arctan2(z, x), axis=0)).max() < 1e-9
+
+
+def test_a_band_that_is_short_or_of_many_widths_is_no_such_band(monkeypatch):
+    told = []
+    monkeypatch.setattr(limbs, "_across", lambda graph, *rest: told.append(rest) or np.zeros(len(graph.joined), bool))
+    for chart, uv, bends in ((*arc(4.4), True), (*arc(0.7), False), (*cross()[1:], False)):
+        told.clear()
+        without_limbs(chart, uv, np.ones(len(uv)), UP)
+        assert bool(told) == bends
 
 
 def test_what_is_dear_is_not_cut():
@@ -131,6 +165,53 @@ def test_parts_of_a_chart_know_their_vertices():
     assert np.array_equal(used[part.triangles], chart.triangles[rows])
     assert np.array_equal(part.vertex_ids, chart.vertex_ids[used])
     assert np.array_equal(part.corners, chart.corners[rows]) and np.array_equal(part.faces, chart.faces[rows])
+
+
+def test_patches_go_with_the_part_that_is_all_around_them():
+    """Two holes of a chart, filled; cut beside both, each part is a disk with one, and cut through one that is open."""
+    V, F = meshes.grid(12, 4, width=12, height=4)
+    middle = V[F].mean(axis=1)
+    hole = [(np.abs(middle[:, :2] - at) < 1).all(axis=1) for at in ([3, 2], [9, 2])]
+    owner = np.where(hole[0] | hole[1], -1, np.arange(len(F)))
+    (whole,) = strict_charts(triangle_surface(V, F))
+    real = owner[whole.faces] >= 0
+    own = np.isin(np.arange(len(V)), whole.triangles[real])
+    chart = replace(
+        whole,
+        triangles=whole.triangles[real],
+        corners=whole.corners[real],
+        faces=whole.faces[real],
+        vertex_ids=np.where(own, whole.vertex_ids, -1),
+        patches=whole.triangles[~real],
+    )
+    place = chart.vertices[chart.triangles].mean(axis=1)[:, 0]
+    for line, patched in ((6, (8, 8)), (3, (0, 8))):
+        for side, count in zip((place < line, place > line), patched, strict=True):
+            part, used = part_of_chart(chart, side)
+            assert len(part.patches) == count and len(part.triangles) == side.sum()
+            np.testing.assert_array_equal(part.vertices, chart.vertices[used])
+            np.testing.assert_array_equal(used[part.triangles], chart.triangles[side])
+            np.testing.assert_array_equal(part.vertex_ids, chart.vertex_ids[used])
+            here = chart.vertices[chart.patches].mean(axis=1)[:, 0]
+            here = (here < line) if count and side[place.argmin()] else (here > 6)
+            np.testing.assert_array_equal(used[part.patches], chart.patches[here & (count > 0)])
+            # With its patches it is the disk that it was, without holes.
+            assert line != 6 or len(boundary_loops(part.disk)) == 1
+
+
+@pytest.mark.parametrize(("holes", "fill"), [(2, True), (3, False)])
+def test_what_has_holes_loses_limbs_as_well(monkeypatch, holes, fill):
+    """A head whose eyes are open sprawls as one whose eyes are closed."""
+    for name in ("SPRAWLING", "FULL", "FULLER", "HOPEFUL"):
+        monkeypatch.setattr(limbs, name, 1.0)
+    V, F = bodies.limbed(3)
+    middle = V[F].mean(axis=1)
+    far = np.linalg.norm(middle[:, None] - middle[[50, 700, 1100][:holes]], axis=2).min(axis=1)
+    F = F[far > 0.12]
+    found = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=1.35, fill_holes=fill)))
+    assert len(found.charts) > 1 and any(len(chart.patches) for chart in found.charts)
+    assert not any(one.folds for one in found.maps) and max(one.angle_mean for one in found.maps) <= 1.35
+    assert sorted(np.concatenate([chart.faces for chart in found.charts])) == list(range(len(F)))
 
 
 @pytest.mark.parametrize("seed", [2, 7])
