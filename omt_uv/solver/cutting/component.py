@@ -103,6 +103,12 @@ class CutComponent:
         """Factor (n,) > 0 by which a cut would rather end at a vertex: small where cuts are to be avoided."""
         return 1 - AVOIDED_TIP * self.avoid
 
+    @property
+    def is_disk(self) -> bool:
+        """Whether it is one, with a boundary all around."""
+        edges = len(self.pair) + len(self.boundary)
+        return self.vertex_count - edges + len(self.triangles) == 1 and len(self.boundary) > 0
+
     def on_boundary(self) -> np.ndarray:
         """Boundary vertices (n,) bool."""
         tail, head = halfedges(self.triangles)

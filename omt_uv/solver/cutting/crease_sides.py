@@ -22,15 +22,13 @@ from ..revolution.axis import has_axis
 from ..revolution.rings import rings_of_edges
 from .component import SMOOTH, CutComponent, SideFinder, lone_edges, make_component, with_quads
 from .cut_graph import cut_classes
-from .developable_nets import BENT, HARD, MUCH, defects, net
+from .developable_nets import HARD, MUCH, defects, net, tight_edges
 from .gluing_facts import cost_factors, diagonal_pairs, marked_triangles
 
 # Components with less than this share of the area stay whole: of thousands of pieces none is looked at.
 VISIBLE = 1e-3
 # A side unrolls but for little if it has no more curvature than this, in radians and summed without sign.
 ROUND = 1.0
-# A fold belongs to a bevel if its radius is at most that share of the side of a square with the area of the body.
-TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
 # whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of so many sides
 # that nearly all unroll, or half where nearly all borders are hard: low ones of animals are folded everywhere, into
@@ -79,6 +77,11 @@ MOST_JOINED = 256
 LEVEL = np.radians(2)
 FLAT = 0.999
 LEAST_OUTLINE = 6
+# An end has this share of the area of a disk with as long an outline, or it is a strip. Those of hoses are small beside
+# all else, with that share of it, but round: more than a square is.
+STRIP = 0.35
+LEAST_END = 5e-3
+ROUND_END = 0.85
 # An edge closes it off that folds by more: prisms of ten sides do, chamfers too, and bodies of twelve are smooth.
 CLOSED = np.radians(33)
 # What does not close when it is laid flat, over its extent, does not unroll.
@@ -113,8 +116,6 @@ def hard_borders(
         if not search.wants(owner, bool(np.isin(k, marked))):
             continue
         turns = search.asked > 0 and has_axis(positions, corners, owner)
-        if not (creased[k] or turns):
-            continue
         component = make_component(left, positions, classes, members[k], pairs[k][pairs[k] < len(number)], free, factor)
         edges = known.found_for(component)
         if edges is None:
@@ -130,7 +131,8 @@ def _borders(
     """Edges (e,) bool along which a component comes apart; asked : see `rings.rings_of_edges`, 0 of what has no axis;
     diagonals : gives pairs (p,) bool of the gluing that are those of quads it was triangulated from, None where its
     creases, if it is creased, count as they are."""
-    sides = hard_sides(component, diagonals is None) if creased else None
+    # Bodies whose edges are all rounded have sides, too; a disk with such a edge lies flat as it is.
+    sides = hard_sides(component, diagonals is None) if creased or not component.is_disk else None
     if sides is not None and diagonals is not None:
         # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
         diagonal = diagonals()[component.gluing_pair]
@@ -148,7 +150,7 @@ def cap_borders(component: CutComponent) -> np.ndarray:
     """Edges (e,) bool around the large flat sides of a component that sharp edges or bevels close off all around, as
     the ends of a barrel are: what is no disk is cut anyway, and a cut across one would leave it in petals."""
     joined, count = component.pair // 3, len(component.triangles)
-    if component.vertex_count - len(joined) - len(component.boundary) + count == 1 and len(component.boundary):
+    if component.is_disk:
         return np.zeros(len(joined), dtype=bool)
     fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     level = (fold <= LEVEL) | ~np.isfinite(component.cost)
@@ -159,14 +161,20 @@ def cap_borders(component: CutComponent) -> np.ndarray:
     whole = np.linalg.norm([np.bincount(side, x) for x in normal.T], axis=0)
     pair = side[joined]
     border = pair[:, 0] != pair[:, 1]
+    has_hole = ~_disks(component, border, side, len(area))
     pair, length = pair[border], component.length[border]
-    sharp = ((fold > CLOSED) | _tight(component, fold))[border]
+    sharp = ((fold > CLOSED) | tight_edges(component, fold))[border]
 
     def around(amount: np.ndarray) -> np.ndarray:
         return np.bincount(pair.ravel(), np.repeat(amount, 2), len(area))
 
-    cap = (area >= LARGE * area.sum()) & (whole >= FLAT * area) & (around(np.ones(len(pair))) >= LEAST_OUTLINE)
+    compact = 4 * np.pi * area / np.maximum(around(length), 1e-300) ** 2
+    # Facets of hoses and bevels of limbs are strips, and what is small beside all else has to be round.
+    cap = (area >= LARGE * area.sum()) & (has_hole | (compact >= STRIP))
     cap &= around(length * sharp) >= ALL * around(length)
+    end = (area >= LEAST_END * area.sum()) & (compact >= ROUND_END)
+    cap |= end & (around(length * (fold > HARD)[border]) >= ALL * around(length))
+    cap &= (whole >= FLAT * area) & (around(np.ones(len(pair))) >= LEAST_OUTLINE)
     # The sides of a beam end at one another.
     cap &= around(length * cap[pair].all(axis=1)) < HALF * around(length)
     border[border] = cap[pair].any(axis=1)
@@ -191,7 +199,7 @@ def hard_sides(component: CutComponent, may_swell: bool = False) -> tuple[np.nda
     other, and of one that swells unless it may."""
     fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     joined, count, length = component.pair // 3, len(component.triangles), component.length
-    tight = _tight(component, fold)
+    tight = tight_edges(component, fold)
     hard = ((fold > SMOOTH) | tight) & np.isfinite(component.cost)
     side = graph_components(joined[~hard, 0], joined[~hard, 1], count)[1]
     border = side[joined[:, 0]] != side[joined[:, 1]]
@@ -248,14 +256,6 @@ def _ribbons(component: CutComponent, side: np.ndarray, border: np.ndarray) -> b
     outline = np.bincount(side[component.pair[border] // 3].ravel(), np.repeat(component.length[border], 2), count)
     outline += np.bincount(side[component.boundary // 3], lengths(ends[1] - ends[0]), count)
     return bool(area[4 * np.pi * area < RIBBON * outline**2].sum() > HALF * area.sum())
-
-
-def _tight(component: CutComponent, fold: np.ndarray) -> np.ndarray:
-    """Edges (e,) bool of bevels: with folds (e,) of a radius that is small for the body, however many they are."""
-    _, polygon = np.unique(component.polygons, return_inverse=True)
-    area = np.bincount(polygon.ravel(), face_areas(component.positions, component.triangles))
-    width = area[polygon.ravel()[component.pair // 3]].min(axis=1) / np.maximum(component.length, 1e-30)
-    return (fold > BENT) & (width < TIGHT * np.sqrt(area.sum()) * fold)
 
 
 def _with_bands(

@@ -23,6 +23,8 @@ from .hard_surface import net_factors, rounded_corners
 HARD = np.radians(52)
 # On bodies with rounded edges, one at which it turns by more: the bands that are bevels, not the flat sides.
 BENT = np.radians(5)
+# A fold belongs to a bevel if its radius is at most that share of the side of a square with the area of the body.
+TIGHT = 0.05
 # A vertex with less curvature, in radians, is flat. Those of hard edges that are many, and have much of it together
 # alone, as around a cap of thousands of sides, are flat if they have less than this share of their mean.
 FLAT = 1e-3
@@ -129,6 +131,14 @@ def net(component: CutComponent) -> Net | None:
         return None
     cost = np.where(folded, component.cost, ACROSS * component.cost + enter) * net_factors(component, folded)
     return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost)
+
+
+def tight_edges(component: CutComponent, fold: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of bevels: with folds (e,) of a radius that is small for the body, however many they are."""
+    _, polygon = np.unique(component.polygons, return_inverse=True)
+    area = np.bincount(polygon.ravel(), face_areas(component.positions, component.triangles))
+    width = area[polygon.ravel()[component.pair // 3]].min(axis=1) / np.maximum(component.length, 1e-30)
+    return (fold > BENT) & (width < TIGHT * np.sqrt(area.sum()) * fold)
 
 
 def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:

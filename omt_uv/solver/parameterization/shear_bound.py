@@ -145,8 +145,9 @@ def _further_rounds(
         begin, width = 1 - 0.5 ** (rounds - 1), 0.5**rounds
         if not last.searched:
             break
-        if rounds > 1 and (last.mean <= last.bound).all():
-            # What is steep alone, as single triangles of a coarse mesh are, need not be slit.
+        if (last.mean <= (1 + NEARLY) * last.bound).all():
+            # What is steep alone, as single triangles of a coarse mesh are, need not be slit, and what misses the bound
+            # by little not be searched.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
                 return spared

@@ -330,7 +330,7 @@ def test_tight_folds_are_those_of_a_small_radius():
     area = face_areas(body.positions, body.triangles)
     whole = np.sqrt(area.sum())
     polygon = {q: area[body.polygons == q].sum() for q in np.unique(body.polygons)}
-    found = crease_sides._tight(body, fold)
+    found = developable_nets.tight_edges(body, fold)
     for k, (f, s) in enumerate(body.pair):
         narrow = min(polygon[body.polygons[h // 3]] for h in (f, s)) / body.length[k]
         # An arc of a radius that turns by the fold is as wide as their product.
