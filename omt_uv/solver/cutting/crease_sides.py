@@ -168,11 +168,11 @@ def cap_borders(component: CutComponent) -> np.ndarray:
     def around(amount: np.ndarray) -> np.ndarray:
         return np.bincount(pair.ravel(), np.repeat(amount, 2), len(area))
 
-    compact = 4 * np.pi * area / np.maximum(around(length), 1e-300) ** 2
+    disk = around(length) ** 2 / (4 * np.pi)
     # Facets of hoses and bevels of limbs are strips, and what is small beside all else has to be round.
-    cap = (area >= LARGE * area.sum()) & (has_hole | (compact >= STRIP))
+    cap = (area >= LARGE * area.sum()) & (has_hole | (area >= STRIP * disk))
     cap &= around(length * sharp) >= ALL * around(length)
-    end = (area >= LEAST_END * area.sum()) & (compact >= ROUND_END)
+    end = (area >= LEAST_END * area.sum()) & (area >= ROUND_END * disk)
     cap |= end & (around(length * (fold > HARD)[border]) >= ALL * around(length))
     cap &= (whole >= FLAT * area) & (around(np.ones(len(pair))) >= LEAST_OUTLINE)
     # The sides of a beam end at one another.

@@ -41,6 +41,9 @@ SPARED = 0.05
 # Of what came apart parts with this share of the area are searched anew, unless they lie flat: a shorter cut would go
 # across what does along its edges.
 LARGE_PART = 0.03
+# They keep what has at most this share of the length: what was cut of the whole goes through, along a tube, and cuts of
+# its own end in slits.
+SHORTER_PART = 0.9
 # Of charts with more vertices cuts are straight, but for what the search has no eye for.
 IN_STEPS = 10000
 # Charts that shear more come apart around flat sides, where that leaves no more than this share of log(shear).
@@ -345,7 +348,7 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     missed = np.bincount(of, new.pressing > new.bound, count) > 0
     sprawls = np.bincount(of, new.extent > np.maximum(last.extent[of], COMPACT * np.sqrt(last.area.sum())), count) > 0
     # The outline of a part is there before and after.
-    stay = missed | sprawls | (np.bincount(of, new.outline_length, count) >= last.outline_length)
+    stay = missed | sprawls | (np.bincount(of, new.outline_length, count) > SHORTER_PART * last.outline_length)
     return last if stay.all() else last.merged(search, new, of, stay)
 
 
