@@ -292,7 +292,9 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
     spared = dict(zip(last.searched, mapped, strict=True))
     maps = [spared.get(k, one) for k, one in enumerate(last.maps)]
     new = Round.of(search, last.charts, maps, last.cuts, last.memory, last.settled, last.slits)
-    return new if new.excess < last.excess else last
+    if new.excess >= last.excess:
+        return last
+    return new if new.excess else (yield from _straightened(search, new, map_sparing, early))
 
 
 def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
