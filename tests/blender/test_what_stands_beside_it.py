@@ -211,3 +211,178 @@ def test_a_uv_map_that_is_there_already_needs_no_room(package, there, name):
             match.check_room(obj, given, {"uv"})
     else:
         match.check_room(obj, given, {"uv"})
+
+
+@pytest.mark.parametrize(("first", "active", "rendered"), list(product("AB", "AB", "AB")))
+def test_which_layers_are_active_and_rendered_is_kept_whatever_their_order(package, first, active, rendered):
+    obj = scenes.bump(2, 2)
+    for name in sorted("AB", reverse=first == "B"):
+        scenes.set_uv(obj, scenes.seen_from_above(obj, 0.5), name)
+        obj.data.color_attributes.new(f"of {name}", "BYTE_COLOR", "CORNER")
+    obj.data.uv_layers.active = obj.data.uv_layers[active]
+    obj.data.uv_layers[rendered].active_render = True
+    obj.data.attributes.active_color_name, obj.data.attributes.default_color_name = f"of {active}", f"of {rendered}"
+    read = package("blender.read_attributes").read_attributes
+    other = scenes.bump(2, 2, name="Other")
+    package("blender.write_attributes").write_attributes(other, read(obj.data, ()))
+    assert other.data.uv_layers.active.name == active
+    assert [layer.name for layer in other.data.uv_layers if layer.active_render] == [rendered]
+    there = other.data.attributes
+    assert (there.active_color_name, there.default_color_name) == (f"of {active}", f"of {rendered}")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_marks_go_to_the_edges_that_they_name_in_whatever_order(package, seed):
+    kinds, writing = package("pipelines.attributes"), package("blender.write_attributes")
+    obj = scenes.bump(3, 3)
+    ends = np.array([edge.vertices[:] for edge in obj.data.edges])
+    rng = np.random.default_rng(seed)
+    some = rng.permutation(len(ends))[:10]
+    edges = np.where(rng.random((10, 1)) > 0.5, ends[some], ends[some][:, ::-1])
+    seam, sharp, crease = rng.random(10) > 0.5, rng.random(10) > 0.5, rng.random(10).astype(np.float32)
+    layers = (
+        kinds.Layer("count", "EDGE", "INT", np.arange(1, 11)[:, None].astype(np.int32)),
+        kinds.Layer("way", "EDGE", "FLOAT_VECTOR", rng.random((10, 3)).astype(np.float32)),
+    )
+    writing._write_marks(obj.data, kinds.Marks(edges, seam, sharp, crease, layers))
+    for name, expected in (("use_seam", seam), ("use_edge_sharp", sharp)):
+        found = np.array([getattr(edge, name) for edge in obj.data.edges])
+        assert (found[some] == expected).all() and found.sum() == expected.sum()
+    for name, key, expected in (
+        ("crease_edge", "value", crease), ("count", "value", layers[0].values), ("way", "vector", layers[1].values),
+    ):  # fmt: skip
+        width = expected.size // 10
+        found = np.zeros(width * len(ends), np.float32 if name != "count" else np.int32)
+        obj.data.attributes[name].data.foreach_get(key, found)
+        found = found.reshape(len(ends), width)
+        np.testing.assert_array_equal(found[some], expected.reshape(10, width))
+        assert not np.delete(found, some, axis=0).any()
+
+
+@pytest.mark.parametrize(("layers", "active"), [(1, 0), (2, 0), (2, 1), (3, 1), (3, 2)])
+def test_what_goes_into_a_file_is_the_active_layer_among_all(package, layers, active):
+    obj = scenes.bump(2, 2)
+    uv = [scenes.seen_from_above(obj, 0.2 + 0.1 * k) for k in range(layers)]
+    for k in range(layers):
+        scenes.set_uv(obj, uv[k], f"{k}")
+    obj.data.uv_layers.active_index = active
+    found = package("files.saving")._imported(obj)
+    assert found.layer == active and len(found.layers) == layers
+    np.testing.assert_array_equal(found.uv, uv[active])
+    for mine, theirs in zip(found.layers, uv, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (1,), (0, 1), (0, 1, 2), (2,), (0, 2)])
+def test_figures_are_those_of_exactly_the_objects_that_are_chosen_or_of_none(package, chosen):
+    last_run = package("session.last_run")
+    objects = [scenes.bump(name=f"{k}", offset=2.0 * k) for k in range(3)]
+    scenes.select(objects[:2])
+    assert bpy.ops.uv.omt_unwrap(quality="DRAFT", max_shear=0.0) == {"FINISHED"}
+    scenes.select([objects[k] for k in chosen])
+    assert last_run.look_again() == ("" if chosen in ((), (0, 1)) else "others are selected")
+    last_run.forget()
+
+
+@pytest.mark.parametrize("levels", [0, 1, 2])
+def test_the_panel_has_the_texel_density_of_what_is_rendered(package, levels):
+    last_run, read = package("session.last_run"), package("blender.mesh").read
+    density, evaluated = package("pipelines.texel_density"), package("pipelines.subdivision").evaluated
+    obj = scenes.cube()
+    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.5, (0.1, 0.2)) + 0.05 * np.arange(24)[:, None] % 0.3)
+    if levels:
+        modifier = obj.modifiers.new("Smooth", "SUBSURF")
+        modifier.levels = modifier.render_levels = levels
+    rows = dict(last_run.figures([read(obj)], 1024, 1.0).rows)
+    texels = density.Texels(1024, 1.0)
+    expected, plain = (density.texel_density([r], texels) for r in (evaluated(read(obj)), read(obj)))
+    assert rows["Texel density"] == last_run.density_text(expected)
+    assert (expected == pytest.approx(plain, rel=0.05)) == (levels == 0)
+
+
+def test_levels_of_detail_each_have_the_features_that_they_can_show(package, remeshed, monkeypatch):
+    remesh, drain = package("pipelines.remesh"), package("solver.progress").drain
+    request, series = remeshed
+    shown, seen = [np.array([[0, 1], [1, 2]]), np.array([[0, 1], [2, 3]]), np.array([[0, 1], [1, 2]])], []
+
+    def level(job, source, *_):
+        seen.append(source)
+        yield from ()
+        return series.levels[0]
+
+    features = iter(shown)
+    monkeypatch.setattr(remesh, "_features", lambda *_: (next(features), ()))
+    monkeypatch.setattr(remesh, "_level", level)
+    monkeypatch.setattr(remesh, "_crossings", lambda *_: ())
+    drain(remesh.remesh_series(request.job, package("settings").RemeshSettings(count=40, levels=3)))
+    assert [source.features.tolist() for source in seen] == [x.tolist() for x in shown]
+    # Where they are the same, so are the maps.
+    assert seen[0] is seen[2]
+
+
+@pytest.mark.parametrize("links", list(product(("DATA", "OBJECT"), repeat=2)), ids=str)
+def test_a_checker_keeps_materials_where_they_were_and_takes_only_its_own_away(package, links):
+    checker = package("blender.checker")
+    first = scenes.bump(2, 2)
+    for k in range(2):
+        first.data.materials.append(bpy.data.materials.new(f"of the mesh {k}"))
+    second = bpy.data.objects.new("Second", first.data)
+    bpy.context.collection.objects.link(second)
+    for obj in (first, second):
+        for k, link in enumerate(links):
+            obj.material_slots[k].link = link
+            if link == "OBJECT":
+                obj.material_slots[k].material = bpy.data.materials.new(f"{obj.name} {k}")
+    objects = (first, second)
+    before = [[(slot.link, slot.material) for slot in obj.material_slots] for obj in objects]
+    # What nobody uses is not the checker's, and may be wanted.
+    unused = bpy.data.materials.new("unused"), bpy.data.images.new("unused", 8, 8)
+    for obj in objects:
+        checker.put(obj, "COLOR_GRID", 64)
+    assert all(checker.has_checker(slot.material) for obj in objects for slot in obj.material_slots)
+    # What is of the mesh is given back to both at once, what is of an object to that one.
+    checker.take_off(first)
+    assert [(slot.link, slot.material) for slot in first.material_slots] == before[0]
+    assert [checker.has_checker(slot.material) for slot in second.material_slots] == [k == "OBJECT" for k in links]
+    checker.take_off(second)
+    checker.tidy()
+    assert [[(slot.link, slot.material) for slot in obj.material_slots] for obj in objects] == before
+    assert unused[0].name in bpy.data.materials and unused[1].name in bpy.data.images
+    assert not [m for m in (*bpy.data.materials, *bpy.data.images) if checker.has_checker(m)]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_colours_of_several_objects_are_those_that_each_has_alone(package, count):
+    overlay, read = package("display.overlay"), package("blender.mesh").read
+    objects = [scenes.bump(2 + k, 3, 0.3 + 0.2 * k, name=f"{k}", offset=2.0 * k) for k in range(count)]
+    for obj in objects:
+        scenes.set_uv(obj, scenes.seen_from_above(obj, 0.3))
+
+    def colours(some):
+        overlay.show(bpy.context, [(obj, read(obj)) for obj in some], "SHEAR")
+        name = package("blender.colour_attributes").ATTRIBUTE
+        found = []
+        for obj in some:
+            values = np.zeros(4 * len(obj.data.loops), np.float32)
+            obj.data.attributes[name].data.foreach_get("color", values)
+            found.append(values)
+        overlay.hide(bpy.context)
+        return found
+
+    together = colours(objects)
+    for obj, found in zip(objects, together, strict=True):
+        np.testing.assert_array_equal(found, colours([obj])[0])
+
+
+@pytest.mark.parametrize("coloured", [0, 1, 2])
+def test_colours_are_hidden_by_undo_only_where_no_mesh_has_them_any_more(package, coloured):
+    overlay, read = package("display.overlay"), package("blender.mesh").read
+    objects = [scenes.bump(2, 2, name=name) for name in "AB"]
+    for obj in objects:
+        scenes.set_uv(obj, scenes.seen_from_above(obj, 0.3))
+    overlay.show(bpy.context, [(obj, read(obj)) for obj in objects], "AREA")
+    for obj in objects[coloured:]:
+        package("blender.colour_attributes").remove_colours(obj)
+    overlay._after_undo()
+    assert overlay.kind() == ("AREA" if coloured else "NONE")
+    overlay.hide(bpy.context)

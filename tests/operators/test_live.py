@@ -355,3 +355,14 @@ def test_soft_pins_give_way_and_hard_ones_hold(slider, pins):
         assert np.abs(after[at[12]] - before[at[12]] - [0.4, 0]).max() < 1e-6 and moved[at[0]] == 0
     else:
         assert moved[at[0]] > 0.01 and moved[at[12]] < 0.39
+
+
+@pytest.mark.parametrize("marks", [0, 1, 2])
+def test_escape_is_a_step_of_undo_where_steps_were_made_on_the_way(patch, slider, marks):
+    operator = begin()
+    for k in range(marks):
+        slider.balance = 0.3 + 0.3 * k
+        tick(operator, 30)
+        operator.modal(bpy.context, event("LEFTMOUSE", "PRESS"))
+    assert operator._marks == marks
+    assert operator.modal(bpy.context, event("ESC", "PRESS")) == ({"FINISHED"} if marks else {"CANCELLED"})
