@@ -386,3 +386,21 @@ def test_colours_are_hidden_by_undo_only_where_no_mesh_has_them_any_more(package
     overlay._after_undo()
     assert overlay.kind() == ("AREA" if coloured else "NONE")
     overlay.hide(bpy.context)
+
+
+def test_colours_of_a_library_stay_in_it(package, tmp_path):
+    colours, overlay = package("blender.colour_attributes"), package("display.overlay")
+    obj = scenes.bump(2, 2)
+    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.3))
+    colours.write_colours(obj, np.arange(4), np.zeros((4, 3)))
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {obj})
+    scenes.open_empty()
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (source, target):
+        target.objects = list(source.objects)
+    (linked,) = target.objects
+    bpy.context.collection.objects.link(linked)
+    own = scenes.bump(2, 2, name="Own")
+    scenes.set_uv(own, scenes.seen_from_above(own, 0.3))
+    overlay.show(bpy.context, [(own, package("blender.mesh").read(own))], "AREA")
+    overlay.hide(bpy.context)
+    assert colours.has_colours(linked.data) and not colours.has_colours(own.data)

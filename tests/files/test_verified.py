@@ -199,3 +199,15 @@ def test_companions_go_to_their_places_before_what_names_them(tmp_path, monkeypa
     every = ["c0.mtl", "c1.mtl", "out.obj"]
     assert moved == every[: 3 if not fails else ["c0", "c1", "target"].index(fails) + 1]
     assert target.read_text() == ("old" if fails else "new")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o755])
+def test_a_file_keeps_its_owner_group_and_mode(tmp_path, mode):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(mode)
+    os.chown(path, 65534, 1)
+    verified.write_text(path, "new")
+    found = path.stat()
+    assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (65534, 1, mode) and path.read_text() == "new"

@@ -264,10 +264,11 @@ def test_it_is_packed_on_accept_and_not_on_cancel(patch, slider):
     assert 0 <= uv.min() < 0.02 and 0.98 < uv.max() <= 1
 
 
+@pytest.mark.parametrize("pins", ["HARD", "SOFT"])
 @pytest.mark.parametrize("end", ["KEEP", "BACK"])
-def test_buttons_end_it(patch, slider, end):
+def test_buttons_end_it(patch, slider, end, pins):
     before = scenes.uv_of(patch)
-    operator = begin()
+    operator = begin(pins=pins)
     slider.balance = 0.8
     tick(operator, 10)
     moved = scenes.uv_of(patch)

@@ -347,7 +347,7 @@ def test_a_slice_has_the_one_thread_of_linear_algebra_that_a_script_has(package,
         else:
             operator = scenes.stand_in("uv.omt_queue")
             monkeypatch.setattr(type(operator), "_steps", steps)
-            monkeypatch.setattr(package("operators.arranging.queue"), "_write", lambda *_: None)
+            monkeypatch.setattr(package("operators.arranging.queue"), "_write", lambda *_: [])
             operator.execute(bpy.context)
         assert seen == [[1] * len(before)] * 3
         assert [library.count() for library in threads.libraries()] == [2] * len(before)
