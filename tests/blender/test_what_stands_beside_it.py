@@ -335,7 +335,7 @@ def test_a_checker_keeps_materials_where_they_were_and_takes_only_its_own_away(p
                 obj.material_slots[k].material = bpy.data.materials.new(f"{obj.name} {k}")
     objects = (first, second)
     before = [[(slot.link, slot.material) for slot in obj.material_slots] for obj in objects]
-    # What nobody uses is not the checker's, and may be wanted.
+    # What nobody uses is not the checker's.
     unused = bpy.data.materials.new("unused"), bpy.data.images.new("unused", 8, 8)
     for obj in objects:
         checker.put(obj, "COLOR_GRID", 64)
