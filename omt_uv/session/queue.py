@@ -7,10 +7,12 @@ from collections.abc import Iterator
 
 
 class Job:
-    """An object of the queue: its name, state (WAITING, RUNNING, DONE or FAILED), progress in [0, 1], why it failed."""
+    """An object of the queue: its name, state (WAITING, RUNNING, DONE or FAILED), progress in [0, 1], why it failed,
+    and what there is to say of its UVs."""
 
     def __init__(self, name: str):
         self.name, self.state, self.progress, self.reason = name, "WAITING", 0.0, ""
+        self.warnings: list[str] = []
         self.steps: Iterator | None = None
         self._began = 0.0
 

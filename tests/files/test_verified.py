@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from without_rights import folder_of_nobody, own, without_rights
@@ -163,3 +164,50 @@ def test_what_nothing_locks_is_left_over_after_a_minute(tmp_path, age, goes):
     os.utime(path, (then, then))
     verified.sweep(tmp_path)
     assert path.exists() != goes
+
+
+@pytest.mark.parametrize("fails", [None, "c0", "c1", "target"])
+def test_companions_go_to_their_places_before_what_names_them(tmp_path, monkeypatch, fails):
+    """If one cannot, the file that was there still names those that were there."""
+
+    target, places = tmp_path / "out.obj", {}
+    target.write_text("old")
+    moved, replace = [], verified.os.replace
+
+    def recorded(path, place):
+        if Path(path).suffix != ".new":
+            moved.append(Path(place).name)
+            if fails and Path(place).name.startswith(fails.replace("target", "out")):
+                raise OSError(28, "No space left on device")
+        return replace(path, place)
+
+    monkeypatch.setattr(verified.os, "replace", recorded)
+
+    def write():
+        with verified.staged(target, places) as made:
+            made.write_text("new")
+            for k in range(2):
+                other = made.with_suffix(f".c{k}")
+                other.write_text(f"new {k}")
+                places[other] = tmp_path / f"c{k}.mtl"
+
+    if fails:
+        with pytest.raises(verified.FileError, match="No space"):
+            write()
+    else:
+        write()
+    every = ["c0.mtl", "c1.mtl", "out.obj"]
+    assert moved == every[: 3 if not fails else ["c0", "c1", "target"].index(fails) + 1]
+    assert target.read_text() == ("old" if fails else "new")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o755])
+def test_a_file_keeps_its_owner_group_and_mode(tmp_path, mode):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(mode)
+    os.chown(path, 65534, 1)
+    verified.write_text(path, "new")
+    found = path.stat()
+    assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (65534, 1, mode) and path.read_text() == "new"

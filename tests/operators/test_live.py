@@ -264,10 +264,11 @@ def test_it_is_packed_on_accept_and_not_on_cancel(patch, slider):
     assert 0 <= uv.min() < 0.02 and 0.98 < uv.max() <= 1
 
 
+@pytest.mark.parametrize("pins", ["HARD", "SOFT"])
 @pytest.mark.parametrize("end", ["KEEP", "BACK"])
-def test_buttons_end_it(patch, slider, end):
+def test_buttons_end_it(patch, slider, end, pins):
     before = scenes.uv_of(patch)
-    operator = begin()
+    operator = begin(pins=pins)
     slider.balance = 0.8
     tick(operator, 10)
     moved = scenes.uv_of(patch)
@@ -355,3 +356,14 @@ def test_soft_pins_give_way_and_hard_ones_hold(slider, pins):
         assert np.abs(after[at[12]] - before[at[12]] - [0.4, 0]).max() < 1e-6 and moved[at[0]] == 0
     else:
         assert moved[at[0]] > 0.01 and moved[at[12]] < 0.39
+
+
+@pytest.mark.parametrize("marks", [0, 1, 2])
+def test_escape_is_a_step_of_undo_where_steps_were_made_on_the_way(patch, slider, marks):
+    operator = begin()
+    for k in range(marks):
+        slider.balance = 0.3 + 0.3 * k
+        tick(operator, 30)
+        operator.modal(bpy.context, event("LEFTMOUSE", "PRESS"))
+    assert operator._marks == marks
+    assert operator.modal(bpy.context, event("ESC", "PRESS")) == ({"FINISHED"} if marks else {"CANCELLED"})

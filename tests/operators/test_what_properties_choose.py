@@ -50,3 +50,20 @@ def test_every_property_reaches_its_setting_and_no_other(name):
                 assert changed[field] == (value.lower() if prop.type == "ENUM" else value), (prop.identifier, value)
                 reached |= set(changed)
     assert set(base) - reached == without
+
+
+@pytest.mark.parametrize("source", ["mesh", "uv"])
+@pytest.mark.parametrize("balance", [0.0, 0.3, 1.0])
+def test_of_uvs_in_the_plane_areas_alone_are_asked_for(source, balance):
+    """All else reaches its setting, wherever the region is magnified."""
+    plain = vars(scenes.stand_in("uv.omt_magnify").settings(source))
+    found = vars(scenes.stand_in("uv.omt_magnify", balance=balance, factor=3.0).settings(source))
+    changed = {key: value for key, value in found.items() if value != plain[key]}
+    assert changed == {"factor": 3.0} | ({"balance": balance} if source == "mesh" and balance else {})
+    assert found["source"] == source and found["balance"] == (balance if source == "mesh" else 0.0)
+
+
+@pytest.mark.parametrize("pack", [True, False])
+@pytest.mark.parametrize("around", [True, False])
+def test_islands_may_lie_on_one_another_where_they_are_not_packed(pack, around):
+    assert scenes.stand_in("uv.omt_unwrap", pack=pack, pack_around=around).stacks() == (not pack)

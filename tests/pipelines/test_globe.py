@@ -160,6 +160,23 @@ def test_a_polygon_that_is_folded_near_a_pole_is_counted_once(monkeypatch):
     assert told == [2]
 
 
+@pytest.mark.parametrize("flat", [(), (3,), (0, 1), (0, 1, 3)], ids=str)
+def test_a_triangle_without_an_area_on_the_sphere_is_not_folded(flat, monkeypatch):
+    V, F = meshes.icosphere(1)
+    told, real = [], globes.spherical_areas
+
+    def areas(points, triangles):
+        found = real(points, triangles)
+        found[list(flat)] = 0
+        return found
+
+    monkeypatch.setattr(globes, "spherical_areas", areas)
+    monkeypatch.setattr(globes, "signed_areas", lambda uv, triangles: np.r_[-1, 0, 1, -1, np.ones(len(F) - 4)])
+    monkeypatch.setattr(globes, "_pole_warnings", lambda missed, folded: told.append(folded) or [])
+    drain(project([GlobeJob(triangle_surface(V, F))], LAMBERT))
+    assert told == [len({0, 1, 3} - set(flat))]
+
+
 def one_component(faces):
     """What gives the one component of a surface, its triangles of these polygons (m,)."""
 

@@ -267,6 +267,23 @@ def test_a_refinement_that_used_up_its_steps_is_told(status, told):
     assert len(found) == told and all("stopped before it was done" in text for text in found)
 
 
+@pytest.mark.parametrize("unfinished", [(), (1,), (0, 2), (0, 1, 2)], ids=str)
+def test_refinements_that_used_up_their_steps_are_told_of_their_object(unfinished, monkeypatch):
+    refine_island, count = refine.refine_island, iter(range(3))
+
+    def island(*args, **options):
+        found = yield from refine_island(*args, **options)
+        return replace(found, status="steps" if next(count) in unfinished else "converged", warnings=("own",))
+
+    monkeypatch.setattr(refine, "refine_island", island)
+    patches = [Patch(1, 1), Patch(2, 2)]
+    found = drain(refine_islands([p.given() for p in patches], RefineSettings(quality="draft")))
+    told = [owner for owner, text in found.warnings if "stopped before it was done" in text]
+    assert told == [(0, 1, 1)[k] for k in unfinished]
+    assert [owner for owner, text in found.warnings if text == "own"] == [0, 1, 1]
+    assert [row["status"] == "steps" for rows in found.reports for row in rows] == [k in unfinished for k in range(3)]
+
+
 # ---- regions of islands ---------------------------------------------------------------------------------------
 
 

@@ -26,6 +26,9 @@ def test_what_reaches_beyond_its_tile_is_told_on_every_side(tile, side, far):
     uv = np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])
     uv = np.concatenate([uv, [[0.5, 0.5] + 1.0 * np.array(side) + 0.5 * np.sign(side)]]) + tile
     assert beyond_tile(uv) == pytest.approx(far)
+    # The tile is that of the middle of what is covered, wherever most corners are.
+    for end in (uv.min(axis=0), uv.max(axis=0)):
+        assert beyond_tile(np.concatenate([uv, np.tile(end, (50, 1))])) == pytest.approx(far)
 
 
 def test_a_unit_square_has_the_pixels_of_the_texture_in_every_unit():

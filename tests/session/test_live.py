@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
 import numpy as np
@@ -141,3 +143,60 @@ def test_a_slice_takes_islands_in_turn_until_it_is_over(package, session, monkey
     assert live.follow(0.3, 50.0)
     moved = [not np.array_equal(scenes.uv_of(obj), uv) for obj, uv in zip(objects, before, strict=True)]
     assert len(asked) == sum(moved) == changed
+
+
+def patch_with_pins(vertices=(3, 20)):
+    obj = scenes.bump(5, 4)
+    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.4, (0.2, 0.1)))
+    scenes.pin(obj, vertices)
+    return obj
+
+
+@pytest.mark.parametrize("soft", [False, True])
+@pytest.mark.parametrize("subdivided", [False, True])
+def test_soft_pins_or_hard_ones_areas_are_those_asked_for(package, soft, subdivided):
+    obj = patch_with_pins()
+    obj.modifiers.new("Smooth", "SUBSURF").levels = 2
+    pairs = [(obj, package("blender.mesh").read(obj))]
+    live = package("session.live").Session(bpy.context, pairs, soft, subdivided)
+    expected = package("pipelines.subdivision").target_of(pairs[0][1]).density if subdivided else None
+    live.close()
+    (density,) = (island.density for island in live._islands)
+    assert (density is None) == (not subdivided)
+    if subdivided:
+        assert np.sort(density / density.mean()) == pytest.approx(np.sort(expected / expected.mean()), rel=1e-6)
+
+
+@pytest.mark.parametrize("soft", [False, True])
+@pytest.mark.parametrize("pins", [(), (7,), (3, 20)])
+def test_islands_with_pins_are_not_packed_again(package, soft, pins):
+    obj = patch_with_pins(pins)
+    pairs = [(obj, package("blender.mesh").read(obj))]
+    live = package("session.live").Session(bpy.context, pairs, soft)
+    before = scenes.uv_of(obj)
+    assert live.pack(package("settings").Settings()) == (not pins)
+    assert (scenes.uv_of(obj) == before).all() == bool(pins)
+    live.close()
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+def test_pins_have_places_of_their_own_in_whatever_order_they_come(package, session, order, monkeypatch):
+    obj = patch_with_pins((2, 9, 20))
+    live = session(obj)
+    module, asked = package("session.live"), []
+
+    def live_map(*given):
+        asked.append(given)
+
+    ((owner, island, pins),) = module._islands([(obj, package("blender.mesh").read(obj))])
+    monkeypatch.setattr(module, "LiveMap", live_map)
+    turned = replace(pins, vertices=pins.vertices[order], places=pins.places[order])
+    made = live._live(owner, island, turned)
+    vertices, places = asked[0][3]
+    by_vertex = dict(zip(pins.vertices.tolist(), pins.places.tolist(), strict=True))
+    assert [by_vertex[v] for v in vertices.tolist()] == places.tolist()
+    # One corner stands for each, in the same order.
+    corner = np.array([loop.vertex_index for loop in obj.data.loops])
+    of_chart = island.chart.vertices
+    for pin, v in zip(made.pin_corners, vertices, strict=True):
+        np.testing.assert_allclose(obj.data.vertices[corner[pin]].co[:], of_chart[v], atol=1e-6)

@@ -347,10 +347,35 @@ def test_a_slice_has_the_one_thread_of_linear_algebra_that_a_script_has(package,
         else:
             operator = scenes.stand_in("uv.omt_queue")
             monkeypatch.setattr(type(operator), "_steps", steps)
-            monkeypatch.setattr(package("operators.arranging.queue"), "_write", lambda *_: None)
+            monkeypatch.setattr(package("operators.arranging.queue"), "_write", lambda *_: [])
             operator.execute(bpy.context)
         assert seen == [[1] * len(before)] * 3
         assert [library.count() for library in threads.libraries()] == [2] * len(before)
     finally:
         for library, count in zip(threads.libraries(), before, strict=True):
             library.limit(count)
+
+
+@pytest.mark.parametrize("asked_at", [None, 0, 1, 2])
+def test_the_bar_never_goes_back_and_what_comes_later_is_asked_to_end_as_well(package, asked_at):
+    """Of several objects each has a solver that may end early, and begins a round of its own."""
+    module, progress = package("session.run"), package("solver.progress")
+    obj, asked = scenes.bump(), []
+    ends = [types.SimpleNamespace(ask=lambda k=k: asked.append(k)) for k in range(3)]
+
+    def steps():
+        for k, fraction in enumerate((0.5, 0.2, 0.7)):
+            yield progress.Progress(f"{k}", fraction, None if asked_at is None else ends[k])
+        return "done"
+
+    run, seen = module.Run("", bpy.context, [obj], steps()), []
+    for k in range(3):
+        assert not run.advance(seconds=0.0)
+        seen.append(run.fraction)
+        if k == asked_at:
+            assert run.end_early()
+    assert asked_at is not None or not run.end_early()
+    assert run.advance(seconds=0.0) and run.result == "done"
+    assert seen == [0.5, 0.5, 0.7]
+    assert asked == ([] if asked_at is None else list(range(asked_at, 3)))
+    run.close()

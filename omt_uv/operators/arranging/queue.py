@@ -9,9 +9,11 @@ from bpy.props import FloatProperty
 
 from ...session import following, last_run, queue, run
 from ...session.language import counted, words
-from ..base import Complaint, check_all_local, check_numbers, complaints, mesh_objects, ready, tell, write_layers
+from ..base import Complaint, check_all_local, check_numbers, complaints, mesh_objects, ready, tell, warn, write_layers
 
 UNWRAP = "uv.omt_unwrap"
+# Settings of Unwrap that name vertex groups, by what they are for.
+MARKERS = {"centre": "centre_group", "start": "start_group", "corners": "corner_group"}
 
 
 class UV_OT_omt_queue(bpy.types.Operator):
@@ -59,6 +61,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
             check_numbers(self)
             objects = mesh_objects(context)
             check_all_local([(obj, None) for obj in objects])
+            _check_groups(context, objects)
         except Complaint as complaint:
             return tell(self, context, complaint)
         queue.state = queue.Queue([queue.Job(obj.name) for obj in objects])
@@ -94,7 +97,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
                     job.end("FAILED", f"it took more than {self.limit:.0f} s")
                     return {"RUNNING_MODAL"}
         except StopIteration as stop:
-            _write(obj, stop.value)
+            job.warnings = _write(obj, stop.value)
             job.end("DONE")
         except Complaint as complaint:
             # The job says whose it is.
@@ -105,6 +108,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
     def _steps(self, context: bpy.types.Context, obj: bpy.types.Object):
         """The steps of unwrapping one object, with the settings of the operator."""
         from ...blender.mesh import check_target, read
+        from ...blender.vertex_groups import avoided, map_markers
         from ...pipelines.layout import UnwrapJob
         from ...pipelines.unwrap import lay_out
         from ..unwrap import UV_OT_omt_unwrap
@@ -113,8 +117,10 @@ class UV_OT_omt_queue(bpy.types.Operator):
         with complaints(obj):
             check_target(obj, chosen.uv_layer)
             reading = read(obj)
+            (avoid,) = avoided([obj], _own(obj, chosen.keep_free))
+            (marks,) = map_markers([obj], {role: _own(obj, getattr(chosen, name)) for role, name in MARKERS.items()})
         subdivision = reading.subdivision if chosen.use_subdivision else None
-        job = UnwrapJob.of(reading, subdivision)
+        job = UnwrapJob.of(reading, subdivision, avoid, marks)
         with complaints(objects=[obj]):
             return (yield from lay_out([job], UV_OT_omt_unwrap.settings(chosen)))
 
@@ -133,9 +139,12 @@ class UV_OT_omt_queue(bpy.types.Operator):
             if failed:
                 obj.select_set(obj.name in {job.name for job in failed})
         notices = tuple(last_run.Notice(f"{job.name}: {job.reason}") for job in failed)
+        last_run.state.notices.clear()
+        warn(self, jobs.jobs, [(k, text) for k, job in enumerate(jobs.jobs) for text in job.warnings])
         rows = (("Done", words("{} of {}", len(done), len(jobs.jobs))), ("Failed, selected", f"{len(failed)}"))
         names = tuple(obj.name for obj in last_run.chosen_objects(context))
-        last_run.keep(last_run.Summary(self.bl_label, rows, notices, names))
+        told = tuple(last_run.state.notices)
+        last_run.keep(last_run.Summary(self.bl_label, rows, notices + told, names))
         for notice in notices:
             self.report({"WARNING"}, notice.text)
         jobs.is_over = True
@@ -145,9 +154,34 @@ class UV_OT_omt_queue(bpy.types.Operator):
         return {"FINISHED"} if done else {"CANCELLED"}
 
 
-def _write(obj: bpy.types.Object, layout) -> None:
-    layer = bpy.context.window_manager.operator_properties_last(UNWRAP).uv_layer
-    write_layers([obj], layer, layout)
+def _own(obj: bpy.types.Object, name: str) -> str:
+    """The name of a vertex group, empty where the object has none of this name."""
+    return name if name in obj.vertex_groups else ""
+
+
+def _check_groups(context: bpy.types.Context, objects: list) -> None:
+    """Complain of a vertex group in the settings of Unwrap that none of the objects has."""
+    from ...blender.vertex_groups import avoided
+
+    chosen = context.window_manager.operator_properties_last(UNWRAP)
+    with complaints():
+        for name in ("keep_free", *MARKERS.values()):
+            avoided(objects, getattr(chosen, name))
+
+
+def _write(obj: bpy.types.Object, layout) -> list[str]:
+    """Write the UVs of an object, and its seams where that is asked for; warnings, also those of a last look."""
+    from ...blender.mesh import read
+    from ...blender.seams import mark_seams
+    from ...blender.subdivision import subdivision_warnings
+    from ...pipelines.gate import gate
+
+    chosen = bpy.context.window_manager.operator_properties_last(UNWRAP)
+    write_layers([obj], chosen.uv_layer, layout)
+    if chosen.mark_seams:
+        mark_seams(obj, layout.maps[0].seams)
+    told = [text for _, text in layout.warnings + (subdivision_warnings([obj]) if chosen.use_subdivision else [])]
+    return [*told, *gate([read(obj)], apart=not chosen.pack).warnings()]
 
 
 class UV_OT_omt_queue_stop(bpy.types.Operator):

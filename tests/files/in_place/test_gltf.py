@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mesh_bytes import gltf_parts, imported, imported_triangles, spread
 
-from omt_uv.files.in_place import glb_data, gltf
+from omt_uv.files.in_place import glb, glb_data, gltf
 from omt_uv.files.in_place.imported import InPlaceError
 
 
@@ -198,3 +198,39 @@ def test_accessors_that_lie_are_refused_by_what_is_wrong(text):
     DAMAGED[text](doc)
     with pytest.raises(InPlaceError, match=text):
         glb_data.accessor(glb, 0)
+
+
+@pytest.mark.parametrize("other", ["TEXCOORD_1", "_MINE"])
+def test_where_two_attributes_are_one_accessor_the_other_one_keeps_its_values(tmp_path, other):
+    data, raw = gltf_parts()
+    (tmp_path / "cu be.bin").write_bytes(raw)
+    doc = json.loads(data)
+    attributes = doc["meshes"][0]["primitives"][0]["attributes"]
+    attributes[other] = attributes["TEXCOORD_0"]
+    before = gltf.read(json.dumps(doc).encode(), tmp_path)
+    corners = glb_data.triangles(before.glb, before.glb.doc["meshes"][0]["primitives"][0]).ravel()
+    kept = glb_data.accessor(before.glb, attributes[other])[corners]
+    # One UV for each vertex, so that none is split and the accessor could be written over.
+    vertex_uv = spread(8, 3)
+    x, y, z = glb_data.accessor(before.glb, attributes["POSITION"]).T
+    for uv in (vertex_uv[corners], spread(36)):
+        mesh = imported(corners.reshape(-1, 3), uv, np.stack([x, -z, y], axis=1))
+        new = gltf.read(gltf.put(json.dumps(doc).encode(), [mesh], tmp_path, tmp_path)[0], tmp_path)
+        (primitive,) = new.glb.doc["meshes"][0]["primitives"]
+        there = glb_data.triangles(new.glb, primitive).ravel()
+        np.testing.assert_array_equal(glb_data.accessor(new.glb, primitive["attributes"][other])[there], kept)
+        np.testing.assert_allclose(uvs(new), uv, atol=2e-7)
+
+
+@pytest.mark.parametrize("changed", [(), (0,), (1,), (0, 1)], ids=str)
+def test_tangents_are_told_of_where_uvs_beside_them_have_changed(monkeypatch, changed):
+    primitives = [{"attributes": {"POSITION": 2 * k, **({"TANGENT": 1} if k == 1 else {})}} for k in range(2)]
+    parts = [SimpleNamespace(primitive=primitive) for primitive in primitives]
+    change = SimpleNamespace(doc={}, glb="glb", result=lambda: "new")
+    monkeypatch.setattr(glb, "GlbChange", lambda *_: change)
+    monkeypatch.setattr(glb, "_parts", lambda *_: (parts, 0))
+    monkeypatch.setattr(glb, "_write_group", lambda _, group: [p for p in group if parts.index(p) in changed])
+    for name in ("_check", "read", "write"):
+        monkeypatch.setattr(glb, name, lambda *_: None)
+    new, told = glb._put("glb", [], False)
+    assert new == ("new" if changed else None) and len(told) == (1 in changed)

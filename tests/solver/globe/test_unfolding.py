@@ -8,7 +8,7 @@ from meshes import icosphere, polygon_surface
 from sphere_shapes import random_sphere
 
 from omt_uv.solver.globe.exact_areas import correct_areas, equirectangular_areas
-from omt_uv.solver.globe.pole_vertices import POLES
+from omt_uv.solver.globe.pole_vertices import POLES, singular_points
 from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
 from omt_uv.solver.globe.unfolding import Polygons, gather_polygons, unfold
 from omt_uv.solver.mesh.geometry import signed_areas
@@ -171,3 +171,18 @@ def test_a_pole_inside_a_face_is_counted_and_laid_out_flat():
     assert np.isfinite(unfolded.corners()).all()
     uv = unfolded.corners()[np.arange(3 * len(F)).reshape(-1, 3)]
     assert np.ptp(uv, axis=1).max() < 1
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+@pytest.mark.parametrize("first", range(6))
+def test_a_pole_is_a_vertex_whatever_its_number(projection, first):
+    """Also the one of number 0; what is missed is told by no vertex at all."""
+    P, F = random_sphere(900, 1)
+    targets = singular_points(projection)
+    if first >= len(targets):
+        return
+    at = int((P @ targets[first]).argmax())
+    order = np.r_[at, np.delete(np.arange(len(P)), at)]
+    number = np.argsort(order)
+    unfolded, _ = unfold(P[order], triangle_polygons(number[F]), projection)
+    assert unfolded.missed == 0
