@@ -21,10 +21,10 @@ from omt_uv.solver.refinement.continuation_rules import QUALITIES, stage_toleran
 
 
 @pytest.mark.parametrize(("name", "way"), product(QUALITIES, [True, False]))
-def test_where_sweeps_follow_no_stage_is_stricter_than_without(name, way):
+def test_with_a_region_no_stage_is_stricter_than_without(name, way):
     quality = QUALITIES[name]
-    swept, plain = (stage_tolerances(quality, 0.0, way, False, swept) for swept in (True, False))
-    assert swept[0] >= plain[0] and swept[0] >= 0.1
+    region, plain = (stage_tolerances(quality, 0.0, way, False, loose) for loose in (True, False))
+    assert region[0] >= plain[0] and region[0] >= 0.1
 
 
 def test_markers_of_one_name_are_told_by_numbers_of_the_mesh():

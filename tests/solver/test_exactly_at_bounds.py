@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -65,16 +66,23 @@ def test_a_disk_is_crowded_above_its_bound(monkeypatch):
 def test_steps_are_followed_by_sweeps_in_large_meshes_with_a_region_alone(monkeypatch, more, swept):
     V, F = meshes.grid(4, 4)
     monkeypatch.setattr(refine, "SWEPT_ABOVE", len(V) - more)
+    monkeypatch.setattr(refine, "SWEPT_ABOVE_WARM", len(V) + 1 - more)
     mesh, given = (
         SimpleNamespace(vertices=V, triangles=F, pins=None),
         {"polygon": None, "region": np.ones(len(F), bool)},
     )
     faces = SimpleNamespace(**given)
-    assert (refine._smoother(mesh, faces, 0.0) is not None) == swept
-    assert refine._smoother(mesh, faces, 0.5) is None
-    assert refine._smoother(mesh, SimpleNamespace(**given | {"region": None}), 0.0) is None
-    assert refine._smoother(mesh, SimpleNamespace(**given | {"polygon": np.arange(len(F))}), 0.0) is None
-    assert refine._smoother(SimpleNamespace(**vars(mesh) | {"pins": 1}), faces, 0.0) is None
+    disk = refine.RefinementOptions(boundary="disk")
+    assert refine._is_loose(mesh, faces, 0.0) == swept
+    assert (refine._smoother(mesh, faces, disk) is not None) == swept
+    assert refine._smoother(mesh, faces, replace(disk, warm_start=True)) is None
+    assert refine._smoother(mesh, faces, replace(disk, boundary="free")) is None
+    assert refine._smoother(mesh, faces, replace(disk, balance=0.5)) is None
+    assert refine._smoother(mesh, SimpleNamespace(**given | {"region": None}), disk) is None
+    monkeypatch.setattr(refine, "SWEPT_ABOVE_WARM", len(V) - more)
+    assert (refine._smoother(mesh, faces, replace(disk, warm_start=True)) is not None) == swept
+    assert refine._smoother(mesh, SimpleNamespace(**given | {"polygon": np.arange(len(F))}), disk) is None
+    assert refine._smoother(SimpleNamespace(**vars(mesh) | {"pins": 1}), faces, disk) is None
 
 
 @pytest.mark.parametrize("free", [False, True])

@@ -181,10 +181,11 @@ def test_problems_that_are_mirrored_count_all_polygons_and_have_no_sweeps(symmet
         symmetry: object = None
         smoother: object = "sweeps"
         count: int | None = None
+        loose: bool = True
 
     found = refinement._mirrored(Problem(), "symmetry" if symmetric else None, "w", 7)
     if symmetric:
-        assert found == Problem(("motion", "symmetry", "w"), "symmetry", None, 7)
+        assert found == Problem(("motion", "symmetry", "w"), "symmetry", None, 7, False)
     else:
         assert found == Problem()
 
@@ -193,8 +194,9 @@ def test_problems_that_are_mirrored_count_all_polygons_and_have_no_sweeps(symmet
 @pytest.mark.parametrize("crosses", [True, False])
 def test_problems_have_the_loop_that_may_cross_itself_and_a_scale(crosses, boundary):
     initial = SimpleNamespace(motion="motion", may_cross=crosses, with_barrier=True)
-    found = refinement._map_problem("faces", "assembly", initial, "loop", boundary, "sweeps")
+    found = refinement._map_problem("faces", "assembly", initial, "loop", boundary, "sweeps", "loose")
     assert (found.faces, found.assembly, found.motion, found.smoother) == ("faces", "assembly", "motion", "sweeps")
+    assert found.loose == "loose"
     assert (
         found.loop == ("loop" if crosses else None) and found.with_barrier and found.scale_free == (boundary != "free")
     )

@@ -158,9 +158,9 @@ def _refined_in_parts():
         omt.unwrap(V, F, boundary="disk")
         patch.setattr(refine, "SWEPT_ABOVE", 30)
         near = (np.linalg.norm((V[F].mean(axis=1) - V.mean(axis=0))[:, :2], axis=1) < 0.3).astype(float)
-        drain(
-            refine.refine(V, F, uv, refine.RefinementOptions(), region=near, target=face_areas(V, F) * (1 + 3 * near))
-        )
+        target = face_areas(V, F) * (1 + 3 * near)
+        for boundary in ("free", "disk"):
+            drain(refine.refine(V, F, uv, refine.RefinementOptions(boundary), region=near, target=target))
 
 
 def _flat_sides():

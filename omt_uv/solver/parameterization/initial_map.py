@@ -65,6 +65,12 @@ COARSEST = 50
 COARSER_FAR = 5
 COARSE_ENOUGH_FAR = 0.4
 DIRECT_FAR = 20000
+# It is left at least so many, if that is coarse enough: of fewer the ring around a region has too few.
+FEWEST_FAR = 2000
+# Large ones with a free boundary leave more of them, and go by way of a still coarser one: what is flattened is far
+# from where a region is to be, and most steps there are cheapest where vertices are few.
+COARSER_FREE = 3
+DIRECT_FREE = 5000
 # A disk whose log scale spreads less is as near, flattened with the boundary as it comes, as the transport brings it.
 LITTLE_SPREAD = 0.5
 # Mean energy of a mean value map above which a large chart starts from a flat one: where slivers make it so bad,
@@ -164,6 +170,7 @@ def _coarse_initial_map(
     """The same; embedded: the mesh itself is, in place of the coarser one alone."""
     far, vertices, triangles = disk.is_far, disk.vertices, disk.triangles
     give_back_of(len(vertices))
+    goal, most = _goal(disk, draft, flat is not None)
     with log.timed("coarsening"):
         if flat is None and embedded:
             flat = disk.embedded
@@ -171,7 +178,6 @@ def _coarse_initial_map(
             # A draft has no steps to spare for a start that is squeezed, too.
             if even is not None and not (draft and map_energy(even, vertices, triangles) > HOPELESS):
                 return InitialChartMap(even)
-        goal = len(vertices) // (COARSER_FAR if far else DRAFT_COARSER if draft else COARSER)
         density = density_of_vertices(vertices, triangles, disk.target, goal) if far else None
         whole = draft and disk.boundary != "free"
         steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density, whole)
@@ -186,7 +192,7 @@ def _coarse_initial_map(
     parts = points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region
     coarse_disk = DiskMesh(*parts, aspect=disk.aspect, buried=disk.buried)
     found = None
-    if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
+    if len(points) > most:
         coarser = coarse_initial_map(coarse_disk, balance, log, None if flat is None else flat[coarse.kept], draft)
         found = yield from part_of(coarser, *COARSE_MAP)
     if found is None and draft and flat is not None:
@@ -211,6 +217,19 @@ def _coarse_initial_map(
         if start is not None and map_energy(start, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(start)
     return InitialChartMap(uv, *stages)
+
+
+def _goal(disk: DiskMesh, draft: bool, again: bool) -> tuple[int, int]:
+    """How many vertices the coarser mesh of a disk is to have, and with how many at most it is mapped by itself.
+
+    again : the disk is a coarser mesh already
+    """
+    count = len(disk.vertices)
+    if not disk.is_far:
+        return (count // DRAFT_COARSER, DRAFT_COARSE_ABOVE) if draft else (count // COARSER, COARSE_ABOVE)
+    if disk.boundary == "free" and (again or count > DIRECT_FAR):
+        return count // COARSER_FREE, DIRECT_FREE
+    return max(count // COARSER_FAR, min(FEWEST_FAR, int(COARSE_ENOUGH_FAR * count))), DIRECT_FAR
 
 
 def _coarse_or_coarser_refined(

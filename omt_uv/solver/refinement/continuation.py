@@ -68,6 +68,7 @@ class MapProblem:
     loop : a boundary, see `contacts.loop_edges`, that may not cross itself, or None
     with_barrier : from the beginning
     scale_free : the scale of the targets follows the map
+    loose : stages end on a looser promise, see `continuation_rules.stage_tolerances`
     symmetry : of the maps, or None
     count : of the polygons, where `faces` are those of one half, see `mirrored_motion.halved`
     """
@@ -81,6 +82,7 @@ class MapProblem:
     smoother: Smoother | None = None
     symmetry: MirrorSymmetry | None = None
     count: int | None = None
+    loose: bool = False
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.
@@ -248,7 +250,7 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
     on_the_way, swept, region = ahead < 0, problem.smoother is not None, problem.faces.region is not None
     # Maps on the way to others say what those will be: they go as far as they promise.
     expecting = balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED
-    tolerance, loose = stage_tolerances(quality, balance, on_the_way, not problem.scale_free, swept)
+    tolerance, loose = stage_tolerances(quality, balance, on_the_way, not problem.scale_free, problem.loose)
     brisk = expecting and quality.tolerance >= LOOSE
     return StageLimits(
         area_error=np.inf if on_the_way else quality.area_error,

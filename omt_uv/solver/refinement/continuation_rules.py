@@ -47,11 +47,11 @@ NEARLY_SETTLED = 0.08
 # promised more has only begun, as on a closed body with a short slit.
 PASSED = 4.0
 NEAR_THE_END = 0.5
-# The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less. Share
-# of the energy where the goal is not reached, where it is, and on the way.
-SWEPT_TOLERANCE = 0.1
-SWEPT_LOOSE = 0.15
-SWEPT_ON_THE_WAY = 0.1
+# The same of large meshes with a region: what Newton promises then is in few faces. Share of the energy where the goal
+# is not reached, where it is, and on the way.
+REGION_TOLERANCE = 0.1
+REGION_LOOSE = 0.15
+REGION_ON_THE_WAY = 0.1
 # With a balance the weight alone decides, and neighbouring balances must not differ by chance.
 STRICT = 1e-4
 # Area weight at balance 1. Without it the map of least shear has no scale; and much below this the mean shear, which is
@@ -261,17 +261,17 @@ def has_kept(share: Number, gain: Number, decrement: Number) -> Truth:
 
 
 def stage_tolerances(
-    quality: Quality, balance: float, on_the_way: bool, early: bool, swept: bool = False
+    quality: Quality, balance: float, on_the_way: bool, early: bool, loose: bool = False
 ) -> tuple[float, float]:
     """Tolerance of a stage where its goal is not reached, and where it is; see `judge_step`.
 
     on_the_way: its weight is not the last of those planned; early: it may end sooner for that, see ON_THE_WAY;
-    swept: sweeps follow every step
+    loose: of a large mesh with a region, see REGION_TOLERANCE
     """
     if balance > 0:
         return STRICT, LOOSE
-    if swept:
-        return max(quality.tolerance, SWEPT_TOLERANCE), SWEPT_ON_THE_WAY if on_the_way else SWEPT_LOOSE
+    if loose:
+        return max(quality.tolerance, REGION_TOLERANCE), REGION_ON_THE_WAY if on_the_way else REGION_LOOSE
     return quality.tolerance, ON_THE_WAY if on_the_way and early else quality.loose_tolerance
 
 

@@ -47,8 +47,10 @@ INITIAL_MAPS = {
     "rectangle": rectangle_initial_map,
 }
 BOUNDARIES = tuple(INITIAL_MAPS)
-# Below so many vertices Newton's steps take so little time that sweeps between them save none.
+# Below so many vertices Newton's steps take so little time that sweeps between them save none; and from a start that is
+# warm, where there are fewer steps to save, below so many.
 SWEPT_ABOVE = 2000
+SWEPT_ABOVE_WARM = 10_000
 # Area error of a disk above which vertices without room may leave the circle.
 NO_ROOM = 0.005
 # An initial map with a free boundary is smoothed above this mean energy and this number of triangles, in so many
@@ -239,13 +241,13 @@ def _refined(
     by_triangle = asked.by_triangle(mesh, faces)
     initial, w = _start(mesh, faces, boundary, loop)
     initial, notches = _with_notches(initial, mesh, by_triangle, loop, options)
-    smoother = _smoother(mesh, faces, balance)
+    swept = _smoother(mesh, faces, options), _is_loose(mesh, faces, balance)
     warm = options.warm_start
     known = None if pins is not None else _symmetry(mesh, asked, faces, by_triangle)
     parts = sweeping_solver(mesh.vertices, mesh.triangles)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
-        free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, smoother)
+        free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, *swept)
         symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options, loop), *SMOOTHING)
         warm = warm or symmetry is not None
         if symmetry is None and boundary == "free" and not warm:
@@ -255,7 +257,7 @@ def _refined(
     half = halved(faces, symmetry)
     assembly = assembly_of(half, n, parts, symmetry)
     count = len(faces.area)
-    problem = _mirrored(_map_problem(half, assembly, initial, loop, boundary, smoother), symmetry, w, count)
+    problem = _mirrored(_map_problem(half, assembly, initial, loop, boundary, *swept), symmetry, w, count)
     if options.crossing:
         problem = replace(problem, loop=None, with_barrier=False)
     several_pins = pins is not None and len(pins.vertices) > 1
@@ -279,7 +281,7 @@ def _refined(
     if notches and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(initial, mesh.triangles, loop)
         if notched is not None:
-            again = _map_problem(half, assembly, notched, loop, boundary, smoother)
+            again = _map_problem(half, assembly, notched, loop, boundary, *swept)
             problem = _mirrored(again, symmetry, w, count)
             with_notches = yield from minimise_in_stages(problem, w, balance, quality)
             if area_error(faces, with_notches.w) < error:
@@ -324,12 +326,17 @@ def _with_notches(
     return initial if notched is None else notched, False
 
 
-def _smoother(mesh: Renumbered, faces: Elements, balance: float) -> Smoother | None:
-    """Sweeps that follow every step, of large meshes with a region; they know of triangles alone, of no pins, and of no
-    balance."""
-    n = len(mesh.vertices)
-    swept = faces.polygon is None and faces.region is not None and mesh.pins is None and balance == 0
-    return Smoother(mesh.triangles, n) if swept and n > SWEPT_ABOVE else None
+def _is_loose(mesh: Renumbered, faces: Elements, balance: float) -> bool:
+    """Whether stages end on a looser promise: of large meshes with a region, but for polygons, pins, or a balance."""
+    plain = faces.polygon is None and mesh.pins is None and balance == 0
+    return plain and faces.region is not None and len(mesh.vertices) > SWEPT_ABOVE
+
+
+def _smoother(mesh: Renumbered, faces: Elements, options: RefinementOptions) -> Smoother | None:
+    """Sweeps that follow every step, of such meshes in a domain. A boundary that is free gives way by itself."""
+    n, least = len(mesh.vertices), SWEPT_ABOVE_WARM if options.warm_start else SWEPT_ABOVE
+    swept = options.boundary != "free" and n > least and _is_loose(mesh, faces, options.balance)
+    return Smoother(mesh.triangles, n) if swept else None
 
 
 def _next_to_image(
@@ -385,9 +392,10 @@ def _start_options(boundary: str, faces: Elements, far: bool) -> dict:
 
 
 def _may_be_tense(faces: Elements, options: RefinementOptions) -> bool:
-    """Whether an initial map may need to be smoothed."""
+    """Whether an initial map may need to be smoothed: none that is warm, which has been."""
     uneven = faces.ratio.max() > EVEN * faces.ratio.min() and len(faces.triangles) > FEW
-    return bool(options.boundary == "free" and options.quality not in UNSMOOTHED and uneven)
+    may_be = options.boundary == "free" and options.quality not in UNSMOOTHED and not options.warm_start
+    return bool(may_be and uneven)
 
 
 def _smoothed_if_tense(
@@ -413,7 +421,7 @@ def _mirrored(problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarra
     if symmetry is None:
         return problem
     motion = MirroredMotion(problem.motion, symmetry, w)
-    return replace(problem, motion=motion, symmetry=symmetry, smoother=None, count=count)
+    return replace(problem, motion=motion, symmetry=symmetry, smoother=None, loose=False, count=count)
 
 
 def _map_problem(
@@ -423,6 +431,7 @@ def _map_problem(
     loop,
     boundary: str,
     smoother: Smoother | None,
+    loose: bool,
 ) -> MapProblem:
     return MapProblem(
         faces=faces,
@@ -433,4 +442,5 @@ def _map_problem(
         # A polygon in a circle, or a notched square, has less area than the surface: the targets follow it.
         scale_free=boundary != "free",
         smoother=smoother,
+        loose=loose,
     )

@@ -157,7 +157,7 @@ def test_meshes_are_coarsened_by_a_factor_and_only_where_it_pays(far, draft, goa
         monkeypatch.setattr(initial_map, name, lambda *_, name=name: reached(name))
     for more in (-1, 0, 1, 2):
         kept = again + more
-        disk = sized(count + (8 if more == 2 else 0), is_far=far)
+        disk = sized(count + (8 if more == 2 else 0), is_far=far, boundary="disk" if far else "free")
         steps = initial_map._coarse_initial_map(disk, 0.0, RunLog(), np.zeros((len(disk.vertices), 2)), draft, True)
         try:
             found = drain(steps) or "none"
@@ -176,3 +176,25 @@ def test_sites_that_lie_too_close_together_are_none(apart, usable, monkeypatch):
     disk = SimpleNamespace(vertices=V, triangles=F, corners=None, aspect=1.0)
     _, sites, trouble = drain(initial_map._conformal_sites(disk, RunLog()))
     assert (sites is not None) == usable == (trouble == "")
+
+
+@pytest.mark.parametrize(
+    ("count", "boundary", "again", "goal"),
+    [
+        (40_000, "disk", False, (8000, 20_000)),
+        (10_005, "disk", False, (2001, 20_000)),
+        (6000, "disk", False, (2000, 20_000)),
+        (1000, "disk", False, (400, 20_000)),
+        (20_000, "free", False, (4000, 20_000)),
+        (20_001, "free", False, (6667, 5000)),
+        (6667, "free", True, (2222, 5000)),
+        (6667, "disk", True, (2000, 20_000)),
+    ],
+)
+def test_how_far_disks_are_coarsened_whose_target_is_far_from_their_areas(count, boundary, again, goal):
+    assert initial_map._goal(sized(count, boundary=boundary, is_far=True), False, again) == goal
+
+
+@pytest.mark.parametrize(("draft", "goal"), [(True, (2000, 3000)), (False, (1000, 5000))])
+def test_how_far_others_are_coarsened_is_as_it_was(draft, goal):
+    assert initial_map._goal(sized(8000), draft, True) == goal

@@ -103,9 +103,9 @@ def test_a_start_is_ahead_where_its_second_weight_costs_little_more_than_its_fir
 
 def test_stages_on_the_way_end_sooner():
     quality = QUALITIES["standard"]
-    for swept in (False, True):
-        there = rules.stage_tolerances(quality, 0.0, False, early=True, swept=swept)
-        under_way = rules.stage_tolerances(quality, 0.0, True, early=True, swept=swept)
+    for loose in (False, True):
+        there = rules.stage_tolerances(quality, 0.0, False, early=True, loose=loose)
+        under_way = rules.stage_tolerances(quality, 0.0, True, early=True, loose=loose)
         assert there[0] == under_way[0]
     assert rules.stage_tolerances(quality, 0.0, True, early=True)[1] > quality.loose_tolerance
     assert rules.stage_tolerances(quality, 0.0, True, early=False)[1] == quality.loose_tolerance

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import meshes
@@ -89,7 +89,7 @@ def refined(monkeypatch):
         monkeypatch.setattr(
             refinement,
             "_map_problem",
-            lambda half, assembly, initial, loop, boundary, smoother: Problem("loop", True, initial),
+            lambda half, assembly, initial, loop, boundary, smoother, loose: Problem("loop", True, initial),
         )
         monkeypatch.setattr(
             refinement,
@@ -274,7 +274,9 @@ def test_pins_need_a_free_boundary_and_targets_are_scaled_to_the_surface():
 )
 def test_only_large_uneven_targets_are_smoothed(ratio, count, quality, boundary, tense):
     faces = SimpleNamespace(ratio=np.array([1.0, ratio, 1.0]), triangles=np.zeros((count, 3)))
-    assert refinement._may_be_tense(faces, RefinementOptions(boundary=boundary, quality=quality)) == tense
+    options = RefinementOptions(boundary=boundary, quality=quality)
+    assert refinement._may_be_tense(faces, options) == tense
+    assert not refinement._may_be_tense(faces, replace(options, warm_start=True))
 
 
 @pytest.mark.parametrize("boundary", ["square", "rectangle", "free", "disk"])
@@ -296,8 +298,11 @@ def test_sweeps_follow_steps_of_large_meshes_with_a_region(change, n):
         polygon=np.zeros(1) if change == "polygon" else None, region=None if change == "region" else np.zeros(1)
     )
     mesh = SimpleNamespace(vertices=np.zeros((n, 3)), triangles=F, pins="pins" if change == "pins" else None)
-    found = refinement._smoother(mesh, faces, 0.5 if change == "balance" else 0.0)
+    balance = 0.5 if change == "balance" else 0.0
+    found = refinement._smoother(mesh, faces, RefinementOptions(boundary="disk", balance=balance))
     assert (found is not None) == (n == 2001 and change is None)
+    assert refinement._is_loose(mesh, faces, balance) == (n == 2001 and change is None)
+    assert refinement._smoother(mesh, faces, RefinementOptions(balance=balance)) is None
 
 
 def test_elements_triangle_by_triangle_are_those_of_no_polygons():

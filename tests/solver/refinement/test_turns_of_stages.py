@@ -322,7 +322,8 @@ def test_limits_after_a_squeezed_start(relaxing):
 @pytest.mark.parametrize("name", ["standard", "draft", "exact"])
 def test_limits_of_stages(name, ahead, balance, free, swept, region):
     faces = SimpleNamespace(region=np.ones(1) if region else None)
-    problem = MapProblem(faces, None, None, None, False, scale_free=not free, smoother="sweeps" if swept else None)
+    several = {"scale_free": not free, "smoother": "sweeps" if swept else None, "loose": swept}
+    problem = MapProblem(faces, None, None, None, False, **several)
     quality = QUALITIES[name]
     found = continuation._limits(problem, balance, quality, ahead, 70)
     way, exact = ahead < 0, balance == 0
