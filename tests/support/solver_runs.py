@@ -403,7 +403,7 @@ def _with_symmetry():
     """Bodies and patches that are their own mirror images."""
     V, F = meshes.icosphere(2)
     W = V * [1.0, 1.4, 0.8] * (1 + 0.2 * np.abs(V[:, [0]]) + 0.1 * V[:, [2]])
-    omt.unwrap(W, F, max_shear=1.15)
+    omt.unwrap(W, F, max_shear=1.08)
     omt.sphere_map(W, F, balance=0.5)
     A, G = meshes.two_bumps(10)
     omt.unwrap(A, G, balance=0.2)
