@@ -19,7 +19,16 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import limbs
-from omt_uv.solver.seams.limbs import FULLER, LEAST_LIMB, MUCH, SPRAWLING, may_come_apart, sprawls, without_limbs
+from omt_uv.solver.seams.limbs import (
+    FULLER,
+    LEAST_LIMB,
+    MUCH,
+    SPRAWLING,
+    may_come_apart,
+    pieces_of_chart,
+    sprawls,
+    without_limbs,
+)
 
 UP = (0.0, 0.0, 1.0)
 
@@ -167,16 +176,12 @@ def test_parts_of_a_chart_know_their_vertices():
     assert np.array_equal(part.corners, chart.corners[rows]) and np.array_equal(part.faces, chart.faces[rows])
 
 
-def test_patches_go_with_the_part_that_is_all_around_them():
-    """Two holes of a chart, filled; cut beside both, each part is a disk with one, and cut through one that is open."""
-    V, F = meshes.grid(12, 4, width=12, height=4)
-    middle = V[F].mean(axis=1)
-    hole = [(np.abs(middle[:, :2] - at) < 1).all(axis=1) for at in ([3, 2], [9, 2])]
-    owner = np.where(hole[0] | hole[1], -1, np.arange(len(F)))
+def patched(V, F, filled):
+    """The chart of a disk whose triangles `filled` (m,) bool are those of holes."""
     (whole,) = strict_charts(triangle_surface(V, F))
-    real = owner[whole.faces] >= 0
+    real = ~filled[whole.faces]
     own = np.isin(np.arange(len(V)), whole.triangles[real])
-    chart = replace(
+    return replace(
         whole,
         triangles=whole.triangles[real],
         corners=whole.corners[real],
@@ -184,9 +189,17 @@ def test_patches_go_with_the_part_that_is_all_around_them():
         vertex_ids=np.where(own, whole.vertex_ids, -1),
         patches=whole.triangles[~real],
     )
+
+
+def test_patches_go_with_the_part_that_is_all_around_them():
+    """Two holes of a chart, filled; cut beside both, each part is a disk with one, and cut through one that is open."""
+    V, F = meshes.grid(12, 4, width=12, height=4)
+    middle = V[F].mean(axis=1)
+    hole = [(np.abs(middle[:, :2] - at) < 1).all(axis=1) for at in ([3, 2], [9, 2])]
+    chart = patched(V, F, hole[0] | hole[1])
     place = chart.vertices[chart.triangles].mean(axis=1)[:, 0]
-    for line, patched in ((6, (8, 8)), (3, (0, 8))):
-        for side, count in zip((place < line, place > line), patched, strict=True):
+    for line, counts in ((6, (8, 8)), (3, (0, 8))):
+        for side, count in zip((place < line, place > line), counts, strict=True):
             part, used = part_of_chart(chart, side)
             assert len(part.patches) == count and len(part.triangles) == side.sum()
             np.testing.assert_array_equal(part.vertices, chart.vertices[used])
@@ -197,6 +210,15 @@ def test_patches_go_with_the_part_that_is_all_around_them():
             np.testing.assert_array_equal(used[part.patches], chart.patches[here & (count > 0)])
             # With its patches it is the disk that it was, without holes.
             assert line != 6 or len(boundary_loops(part.disk)) == 1
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_what_hangs_together_by_a_filled_hole_alone_stays_whole(apart):
+    V, F = meshes.grid(40, 2, width=20, height=1)
+    middle = np.abs(V[F].mean(axis=1)[:, 0] - 10) < 1
+    chart = patched(V, F, middle & (apart | (V[F].mean(axis=1)[:, 1] > 0.5)))
+    piece, edges = pieces_of_chart(chart, chart.vertices[:, :2], np.ones(len(V)), None, 20.0)
+    assert (piece.max() == 0 and not len(edges)) == apart
 
 
 @pytest.mark.parametrize(("holes", "fill"), [(2, True), (3, False)])
