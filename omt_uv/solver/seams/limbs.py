@@ -84,10 +84,11 @@ def pieces_of_chart(
 
     whole : the area of the surface; cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
-    graph = PolygonGraph.of(chart)
-    if graph.pieces(np.ones(len(graph.joined), dtype=bool)).any():
-        # What hangs together by filled holes alone has no narrow place.
-        return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
+    if len(chart.patches):
+        graph = PolygonGraph.of(chart)
+        if graph.pieces(np.ones(len(graph.joined), dtype=bool)).any():
+            # What hangs together by filled holes alone has no narrow place.
+            return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
     count = _count_of_band(chart, uv, whole)
     return in_pieces(chart, uv, cost, count) if count > 1 else without_limbs(chart, uv, cost, up, images)
 
