@@ -309,6 +309,7 @@ def test_charts_may_cross_themselves_where_they_miss_the_bound_by_much_or_late(m
     [
         (1.35 * 1.04, True, 1.3, True),
         (1.35 * 1.06, True, 1.3, False),
+        (1.35 * 1.04, True, 1.39, True),
         (1.35 * 1.04, True, 1.42, False),
         (1.35 * 1.04, False, 1.3, False),
     ],
@@ -331,9 +332,17 @@ def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
         made.append(maps)
         return round_of([1, 1], [1.0, after])
 
+    def straightened(search, new, map_charts, early):
+        assert map_charts is spare
+        return ("straight", new)
+        yield
+
     monkeypatch.setattr(shear_bound.Round, "of", staticmethod(of))
+    monkeypatch.setattr(shear_bound, "_straightened", straightened)
     found = drain(shear_bound._with_areas_spared(None, last, spare if sparing else None, EarlyEnd()))
     assert (found is not last) == taken
+    # What keeps the bound then is straightened as others are, with maps that are spared as well.
+    assert isinstance(found, tuple) == (taken and after <= 1.35)
     if asked:
         assert asked == [[last.charts[1]]] and made == [[last.maps[0], "spared"]]
 
