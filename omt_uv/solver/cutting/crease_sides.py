@@ -131,7 +131,7 @@ def _borders(
     """Edges (e,) bool along which a component comes apart; asked : see `rings.rings_of_edges`, 0 of what has no axis;
     diagonals : gives pairs (p,) bool of the gluing that are those of quads it was triangulated from, None where its
     creases, if it is creased, count as they are."""
-    # Bodies whose edges are all rounded have sides, too; a disk with such a edge lies flat as it is.
+    # Bodies whose edges are all rounded have sides, too; a disk with such an outline lies flat as it is.
     sides = hard_sides(component, diagonals is None) if creased or not component.is_disk else None
     if sides is not None and diagonals is not None:
         # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.

@@ -57,7 +57,8 @@ def _around(
     tail, head = halfedges(triangles)
     row, other = closed.row[tail[pair[:, 0]]], closed.row[head[pair[:, 0]]]
     within, count = row == other, len(closed.radius)
-    price = np.bincount(row[within], cost[within], count) / np.bincount(row[within], length[within], count)
+    around = np.maximum(np.bincount(row[within], length[within], count), 1e-300)
+    price = np.bincount(row[within], cost[within], count) / around
     # A row whose edges are not all there, or within polygons, closes no ring.
     whole = np.bincount(row[within], minlength=count) == np.bincount(closed.row, minlength=count)
     price = np.where(whole, price, np.inf)

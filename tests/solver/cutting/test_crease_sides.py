@@ -332,7 +332,7 @@ def test_a_ring_whose_edges_are_all_rounded_comes_apart_into_its_sides():
     assert np.abs(fold_angles(body.positions, body.triangles, body.pair)).max() < SMOOTH
     found, shear = shear_of(surface_of(V, Q))
     assert len(found.charts) >= 4 and shear < 1.06
-    # Half a letter is a disk, and lies flat but for its edge: it stays whole.
+    # Half a letter is a disk, and lies flat but for its outline: it stays whole.
     half = Q[V[Q].mean(axis=1)[:, 2] > 0.15]
     half = half[V[half].mean(axis=1)[:, 0] > 0]
     used, half = np.unique(half, return_inverse=True)
