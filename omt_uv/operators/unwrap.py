@@ -29,6 +29,9 @@ from .properties import (
     shear_bound,
 )
 
+# Settings that name vertex groups, by what they are for.
+MARKERS = {"centre": "centre_group", "start": "start_group", "corners": "corner_group"}
+
 
 class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, SolverOperator, bpy.types.Operator):
     """Unwrap so that every part of the surface gets its share of the texture. Islands follow the seams, pins stay"""
@@ -136,9 +139,7 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
         objects, readings = read_writable(context, self.uv_layer)
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
-            marked = map_markers(
-                objects, {"centre": self.centre_group, "start": self.start_group, "corners": self.corner_group}
-            )
+            marked = map_markers(objects, {role: getattr(self, name) for role, name in MARKERS.items()})
             jobs = [
                 UnwrapJob.of(r, modifier, avoid, marks)
                 for r, avoid, marks, modifier in zip(readings, free, marked, self.subdivisions(readings), strict=True)
@@ -147,15 +148,21 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
         return objects, layout
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender.seams import mark_seams
-        from ..blender.subdivision import subdivision_warnings
-
         objects, layout = result
-        write_layers(objects, self.uv_layer, layout)
-        if self.mark_seams:
-            for obj, surface_map in zip(objects, layout.maps, strict=True):
-                mark_seams(obj, surface_map.seams)
-        warn(self, objects, layout.warnings + (subdivision_warnings(objects) if self.use_subdivision else []))
+        warn(self, objects, write_result(self, objects, layout))
+
+
+def write_result(chosen, objects: list, layout) -> list[tuple[int, str]]:
+    """Write the UVs of objects, and their seams if the settings that were chosen say so: warnings, each with the number
+    of its object."""
+    from ..blender.seams import mark_seams
+    from ..blender.subdivision import subdivision_warnings
+
+    write_layers(objects, chosen.uv_layer, layout)
+    if chosen.mark_seams:
+        for obj, surface_map in zip(objects, layout.maps, strict=True):
+            mark_seams(obj, surface_map.seams)
+    return layout.warnings + (subdivision_warnings(objects) if chosen.use_subdivision else [])
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

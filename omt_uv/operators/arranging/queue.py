@@ -9,11 +9,9 @@ from bpy.props import FloatProperty
 
 from ...session import following, last_run, queue, run
 from ...session.language import counted, words
-from ..base import Complaint, check_all_local, check_numbers, complaints, mesh_objects, ready, tell, warn, write_layers
+from ..base import Complaint, check_all_local, check_numbers, complaints, mesh_objects, ready, tell, warn
 
 UNWRAP = "uv.omt_unwrap"
-# Settings of Unwrap that name vertex groups, by what they are for.
-MARKERS = {"centre": "centre_group", "start": "start_group", "corners": "corner_group"}
 
 
 class UV_OT_omt_queue(bpy.types.Operator):
@@ -111,7 +109,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
         from ...blender.vertex_groups import avoided, map_markers
         from ...pipelines.layout import UnwrapJob
         from ...pipelines.unwrap import lay_out
-        from ..unwrap import UV_OT_omt_unwrap
+        from ..unwrap import MARKERS, UV_OT_omt_unwrap
 
         chosen = context.window_manager.operator_properties_last(UNWRAP)
         with complaints(obj):
@@ -162,6 +160,7 @@ def _own(obj: bpy.types.Object, name: str) -> str:
 def _check_groups(context: bpy.types.Context, objects: list) -> None:
     """Complain of a vertex group in the settings of Unwrap that none of the objects has."""
     from ...blender.vertex_groups import avoided
+    from ..unwrap import MARKERS
 
     chosen = context.window_manager.operator_properties_last(UNWRAP)
     with complaints():
@@ -172,15 +171,11 @@ def _check_groups(context: bpy.types.Context, objects: list) -> None:
 def _write(obj: bpy.types.Object, layout) -> list[str]:
     """Write the UVs of an object, and its seams where that is asked for; warnings, also those of a last look."""
     from ...blender.mesh import read
-    from ...blender.seams import mark_seams
-    from ...blender.subdivision import subdivision_warnings
     from ...pipelines.gate import gate
+    from ..unwrap import write_result
 
     chosen = bpy.context.window_manager.operator_properties_last(UNWRAP)
-    write_layers([obj], chosen.uv_layer, layout)
-    if chosen.mark_seams:
-        mark_seams(obj, layout.maps[0].seams)
-    told = [text for _, text in layout.warnings + (subdivision_warnings([obj]) if chosen.use_subdivision else [])]
+    told = [text for _, text in write_result(chosen, [obj], layout)]
     return [*told, *gate([read(obj)], apart=not chosen.pack).warnings()]
 
 

@@ -12,6 +12,7 @@ from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
 from ..mesh.charts import Chart
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
+from ..revolution.axis import has_axis
 from ..seams.options import COMPACT, SPREAD_BY_SHEAR
 from .chart_indices import but_within, edge_set, is_marked
 from .chart_map import ChartMap
@@ -326,17 +327,11 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
 def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound whose parts have cuts of their own, where these are shorter than what was cut of the
     whole before it came apart, and keep the bound, too."""
-    from ..revolution.axis import has_axis
-
-    def turns(chart: Chart) -> bool:
-        # What was turned was cut along rings, and shorter cuts of its pieces would be petals.
-        return has_axis(chart.vertices, chart.triangles, chart.faces)
-
     large = (last.area >= LARGE_PART * last.area.sum()) & (last.mean > UNSHEARED)
     parts = [
         k
         for k in np.flatnonzero(large & last.has_room).tolist()
-        if not (last.found_for(k) or search.is_thinned(last.charts[k]) or turns(last.charts[k]))
+        if not (last.found_for(k) or search.is_thinned(last.charts[k]) or _turns(last.charts[k]))
         and (search.shear.further or not is_marked(search.surface, last.charts[k]))
     ]
     if len(last.charts) < 2 or not parts:
@@ -352,6 +347,11 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     # The outline of a part is there before and after.
     stay = missed | sprawls | (np.bincount(of, new.outline_length, count) > SHORTER_PART * last.outline_length)
     return last if stay.all() else last.merged(search, new, of, stay)
+
+
+def _turns(chart: Chart) -> bool:
+    """Whether a chart is of what was turned, and cut along rings: shorter cuts of such pieces would be petals."""
+    return has_axis(chart.vertices, chart.triangles, chart.faces)
 
 
 def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:

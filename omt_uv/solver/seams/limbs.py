@@ -288,7 +288,7 @@ class _Body:
         everywhere, and longer than a square with its area; cost (n,) : see `parting.parted`."""
         nothing = np.zeros(len(self.steps), dtype=bool)
         at_vertex = self._from_end_to_end()
-        along = self.graph.places(self.chart, np.stack([at_vertex, at_vertex], axis=1))[:, 0]
+        along = self.graph.places(self.chart, at_vertex[:, None])[:, 0]
         order = np.argsort(along, kind="stable")
         within = np.empty(len(order))
         within[order] = np.cumsum(self.graph.area[order]) / self.whole

@@ -101,7 +101,7 @@ class PolygonGraph:
         return side[self.joined[:, 0]] != side[self.joined[:, 1]]
 
     def places(self, chart: Chart, uv: np.ndarray) -> np.ndarray:
-        """The middle (p,2) of the triangles of each polygon in a map uv (n,2) of the chart."""
+        """The middle (p,k) of the triangles of each polygon in a map uv (n,2) of the chart, or of values (n,k)."""
         middle = np.stack([np.bincount(self.polygon, x) for x in uv[chart.triangles].mean(axis=1).T], axis=1)
         return middle / np.bincount(self.polygon)[:, None]
 
