@@ -37,8 +37,9 @@ ARROWS: dict[str, str] = {
     "solver.transport": "solver solver.mesh solver.linalg",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
     "solver.revolution": "solver solver.mesh solver.linalg",
+    "solver.walls": "solver solver.mesh solver.linalg",
     "solver.cutting": "solver solver.mesh solver.linalg solver.quads solver.analysis solver.maps solver.conformal "
-    "solver.revolution",
+    "solver.revolution solver.walls",
     "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.packing solver.cutting "
     "solver.revolution",
     "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",

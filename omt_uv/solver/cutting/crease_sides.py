@@ -15,18 +15,16 @@ from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
 from ..maps.overlap import covered_share, covers_little
 from ..mesh.geometry import cross3, face_areas, lengths
-from ..mesh.gluing import Gluing, components, corner_classes, groups
+from ..mesh.gluing import Gluing
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges, pair_keys, paired
 from ..revolution.axis import has_axis
 from ..revolution.rings import rings_of_edges
-from .component import SMOOTH, CutComponent, SideFinder, lone_edges, make_component, with_quads
-from .cut_graph import cut_classes
+from .component import SMOOTH, CutComponent, SideFinder, lone_edges, with_quads
+from .cut_graph import cut_classes, distance_from
 from .developable_nets import HARD, MUCH, defects, net, tight_edges
-from .gluing_facts import cost_factors, diagonal_pairs, marked_triangles
+from .gluing_facts import cost_factors, diagonal_pairs, seen_parts
 
-# Components with less than this share of the area stay whole: of thousands of pieces none is looked at.
-VISIBLE = 1e-3
 # A side unrolls but for little if it has no more curvature than this, in radians and summed without sign.
 ROUND = 1.0
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
@@ -57,10 +55,11 @@ RIBBON = 0.2
 COMPACT = 0.3
 STRAIN = 0.25
 NARROWS = 0.75
-# Sides stay together across an edge whose curvature, in radians and summed without sign, is no more than this, and
-# which is that share of the outline of the smaller one; laid flat, they cover no more than a share of themselves, and
-# of the smaller one.
+# Sides stay together across an edge whose curvature, in radians and summed without sign, is no more than this but for
+# that share of its length at either end, and which is that share of the outline of the smaller one; laid flat, they
+# cover no more than a share of themselves, and of the smaller one.
 STRAIGHT = 0.1
+CORNER = 0.15
 SHARED = 0.15
 COVERED = 2e-3
 COVERED_PART = 1e-2
@@ -101,27 +100,16 @@ def hard_borders(
     Bodies with a net that is short enough and lies beside itself, and those that are not searched, stay whole;
     positions (n,3) in a unit box
     """
-    left, number, found = gluing.without(gone), np.flatnonzero(~gone), np.zeros(len(gone), dtype=bool)
-    component_of, classes = components(left), corner_classes(left)
-    fold = np.abs(fold_angles(positions, left.vertex[left.triangles], np.stack([left.first, left.second], axis=1)))
-    area = np.bincount(component_of, face_areas(positions, left.vertex[left.triangles]))
-    creased = np.bincount(component_of[left.first[fold > SMOOTH] // 3], minlength=len(area)) > 0
-    marked = np.unique(component_of[marked_triangles(surface, left)])
-    free, factor, members = np.zeros(len(positions)), cost_factors(surface, left), groups(component_of)
-    pairs = groups(np.append(component_of[left.first // 3], np.arange(len(members))))
-    known = search.borders[int(search.as_drawn)]
-    diagonals = cache(lambda: diagonal_pairs(left, positions, factor))
-    for k in np.flatnonzero(area >= VISIBLE * area.sum()):
-        corners, owner = left.vertex[left.triangles[members[k]]], left.owner[members[k]]
-        if not search.wants(owner, bool(np.isin(k, marked))):
-            continue
-        turns = search.asked > 0 and has_axis(positions, corners, owner)
-        component = make_component(left, positions, classes, members[k], pairs[k][pairs[k] < len(number)], free, factor)
+    found, known = np.zeros(len(gone), dtype=bool), search.borders[int(search.as_drawn)]
+    left = gluing.without(gone)
+    diagonals = cache(lambda: diagonal_pairs(left, positions, cost_factors(surface, left)))
+    for component, number, creased in seen_parts(surface, gluing, positions, gone, search):
+        turns = search.asked > 0 and has_axis(component.positions, component.triangles, component.polygons)
         edges = known.found_for(component)
         if edges is None:
-            edges = _borders(component, creased[k], turns * search.asked, None if search.as_drawn else diagonals)
+            edges = _borders(component, creased, turns * search.asked, None if search.as_drawn else diagonals)
             known.tell(component, edges)
-        found[number[component.gluing_pair[edges]]] = True
+        found[number[edges]] = True
     return found
 
 
@@ -184,7 +172,7 @@ def cap_borders(component: CutComponent) -> np.ndarray:
 def _has_clear_net(component: CutComponent) -> bool:
     unrolled = net(component)
     found = None if unrolled is None else unrolled.up_to(unrolled.most)
-    if found is None:
+    if found is None or found.is_frayed:
         return False
     # Corners of bevels do not lie flat, and what covers itself for that is little.
     flat, corners, _ = _laid_out(component, found.cut, np.ones(len(component.triangles), dtype=bool))
@@ -383,7 +371,7 @@ def _inner_curvature(
 
 def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The chain (e,) of each border edge, -1 for others; the two sides (c,2) of the chains, their lengths (c,), and
-    the curvature (c,) of the vertices on each and on no other."""
+    the curvature (c,) of the vertices on each and on no other, but near its ends."""
     edges = np.flatnonzero(border)
     pair = np.sort(side[component.pair[edges] // 3], axis=1)
     _, of_pair = np.unique(pair_keys(*pair.T), return_inverse=True)
@@ -398,10 +386,13 @@ def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray,
     vertex = nodes % component.vertex_count
     chains_at = np.bincount(vertex, minlength=component.vertex_count)
     alone = (chains_at[vertex] == 1) & (np.bincount(index.ravel(), minlength=len(nodes)) == 2)
+    length = np.bincount(of_edge, component.length[edges], count)
+    # Where sides meet at a rounded corner, what is curved is the corner's.
+    alone &= distance_from(~alone, index, component.length[edges]) > CORNER * length[label]
     turned = np.bincount(label[alone], curvature[vertex[alone]], count)
     chain = np.full(len(border), -1)
     chain[edges] = of_edge
-    return chain, pair[first], np.bincount(of_edge, component.length[edges], count), turned
+    return chain, pair[first], length, turned
 
 
 def _rows(group: np.ndarray, total: np.ndarray, one: int, other: int) -> tuple[np.ndarray, np.ndarray]:

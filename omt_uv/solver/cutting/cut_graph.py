@@ -317,3 +317,14 @@ def path_to(component: CutComponent, start: np.ndarray, end: int) -> np.ndarray:
     path = np.zeros(len(component.pair), dtype=bool)
     path[_edges_between(component.ends, on_path, before[on_path].astype(np.int64), n)] = True
     return path
+
+
+def distance_from(start: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """How far the nodes (n,) of a graph with edges `ends` (e,2) of these lengths (e,) are from the nearest of those
+    that it starts from (n,) bool; infinite where there is none."""
+    n, begins = len(start), np.flatnonzero(start)
+    if not len(begins):
+        return np.full(n, np.inf)
+    # An edge without a length would be none.
+    graph = csr_matrix((np.maximum(length, 1e-300), ends.T), shape=(n, n))
+    return dijkstra(graph, directed=False, indices=begins, min_only=True)

@@ -22,9 +22,9 @@ from ..quads.diagonals import cut_along_shorter
 from .component import Copies, CutComponent, SideFinder, Topology, classify, make_component
 from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten
-from .developable_nets import net
+from .developable_nets import Net, net
 from .gluing_facts import TurningLines, cost_factors, in_unit_box, to_search, total_curvature, turning_lines
-from .handle_partition import partition_pairs
+from .handle_partition import partition_pairs, wall_pairs
 from .hole_filling import MANY, around_pockets, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
 from .steiner_points import MOST_ENDS, branching_tree
@@ -176,6 +176,7 @@ def cut_gluing(
     if search is not None:
         comes_apart = avoid is None and not search.stays_whole
         if comes_apart:
+            gone |= wall_pairs(surface, gluing, positions, gone, search)
             gone |= hard_borders(surface, gluing, positions, gone, search)
         gone |= around_pockets(surface, gluing, positions, gone, search, comes_apart)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
@@ -320,14 +321,18 @@ class _Cutter:
         again = searched and self.search is not None and self.search.is_again
         unrolled = net(component) if (self.extremities or searched) and not (filled or again) else None
         found = None if unrolled is None else unrolled.up_to(unrolled.most)
-        toothed = found is not None and found.has_teeth and searched and topology.boundaries[k] > 0
-        if found is not None and not (toothed and found.is_comb(_needed(component, topology, k))):
+        if found is not None and not (searched and self._is_torn(found, component, topology, k)):
             return found.cut, found.tips
         if searched and self.search is not None:
             return (yield from self._search_component(component, topology, k, self.search))
         other = cut_component(component, topology, k, self.extremities, self.outline)
         found = None if unrolled is None else unrolled.up_to(LONGER * component.length[other[0]].sum())
         return other if found is None else (found.cut, found.tips)
+
+    @staticmethod
+    def _is_torn(found: Net, component: CutComponent, topology: Topology, k: int) -> bool:
+        """Whether a net of component k is all slits."""
+        return found.is_frayed or (topology.boundaries[k] > 0 and found.is_comb(_needed(component, topology, k)))
 
     def _search_component(
         self, component: CutComponent, topology: Topology, k: int, search: SeamFinder

@@ -17,7 +17,7 @@ from ..maps.overlap import overlap_exceeds
 from ..mesh.geometry import as_points, face_areas
 from .component import CutComponent
 from .cut_graph import cut_classes, greedy_arcs
-from .hard_surface import net_factors, rounded_corners
+from .hard_surface import CURVED, net_factors, rounded_corners
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
 HARD = np.radians(52)
@@ -55,12 +55,13 @@ LONG_TEETH = 1.0
 @dataclass(frozen=True)
 class Net:
     """A cut (e,) bool that unrolls a component through its corners tips (k,), the shortest by the cost (e,) of edges,
-    which may lay the component on itself."""
+    which may lay the component on itself; held (k,) : the curvature at each corner, in radians, or less."""
 
     component: CutComponent
     cut: np.ndarray
     tips: np.ndarray
     cost: np.ndarray
+    held: np.ndarray
 
     @property
     def length(self) -> float:
@@ -88,6 +89,12 @@ class Net:
         long beyond the length that is needed anyway. Around the corners of a lid slits are short."""
         side = float(np.sqrt(face_areas(self.component.positions, self.component.triangles).sum()))
         return self.has_teeth and self.length - needed > LONG_TEETH * side
+
+    @property
+    def is_frayed(self) -> bool:
+        """Whether this net ends at so many corners that are hardly curved: in slits across the border of a sheet."""
+        degree = np.bincount(self.component.ends[self.cut].ravel(), minlength=self.component.vertex_count)
+        return int(np.count_nonzero((degree[self.tips] == 1) & (self.held < CURVED))) > TEETH
 
     def spread_out(self) -> Net:
         """This net or, where the component laid flat along it lies on itself, the shortest of some others along which
@@ -126,11 +133,12 @@ def net(component: CutComponent) -> Net | None:
         found = rounded_corners(component, signed, area)
         folded, enter = fold > BENT, np.zeros(len(fold))
         tips = np.zeros(0, np.int64) if found is None else found
+        curvature = np.full(len(curvature), CURVED)
     # A closed surface needs a cut of two edges at least.
     if len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
     cost = np.where(folded, component.cost, ACROSS * component.cost + enter) * net_factors(component, folded)
-    return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost)
+    return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost, curvature[tips])
 
 
 def tight_edges(component: CutComponent, fold: np.ndarray) -> np.ndarray:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import angle_defects, angles_from_lengths, bounds, halfedge_lengths, lengths
-from ..mesh.gluing import Gluing, components
+from ..analysis.feature_edges import fold_angles
+from ..mesh.geometry import angle_defects, angles_from_lengths, bounds, face_areas, halfedge_lengths, lengths
+from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface, is_seam, is_sharp
 from ..mesh.topology import distinct, first_places, halfedges, pair_keys
 from ..quads.recombination import quad_diagonals
-from .component import SEAM, SHARP, SideFinder
+from .component import SEAM, SHARP, SMOOTH, CutComponent, SideFinder, make_component
 
+# Components with less than this share of the area stay whole: of thousands of pieces none is looked at.
+VISIBLE = 1e-3
 # Edges that are marked are meant to be up to that share of all.
 MEANT = 0.5
 
@@ -122,3 +126,26 @@ def to_search(
     for k in np.flatnonzero(among):
         found[k] = search.wants(gluing.owner[members[k]], bool(marked[k]))
     return found
+
+
+def seen_parts(
+    surface: Surface, gluing: Gluing, positions: np.ndarray, gone: np.ndarray, search: SideFinder
+) -> Iterator[tuple[CutComponent, np.ndarray, bool]]:
+    """The components of a gluing, without pairs that are gone (p,) bool, that are to be searched and large enough to be
+    seen, the pairs (e,) of the gluing that their edges are, and whether any of these is creased.
+
+    positions (n,3) in a unit box
+    """
+    left, number = gluing.without(gone), np.flatnonzero(~gone)
+    component_of, classes = components(left), corner_classes(left)
+    fold = np.abs(fold_angles(positions, left.vertex[left.triangles], np.stack([left.first, left.second], axis=1)))
+    area = np.bincount(component_of, face_areas(positions, left.vertex[left.triangles]))
+    creased = np.bincount(component_of[left.first[fold > SMOOTH] // 3], minlength=len(area)) > 0
+    marked = np.unique(component_of[marked_triangles(surface, left)])
+    free, factor, members = np.zeros(len(positions)), cost_factors(surface, left), groups(component_of)
+    pairs = groups(np.append(component_of[left.first // 3], np.arange(len(members))))
+    for k in np.flatnonzero(area >= VISIBLE * area.sum()):
+        if search.wants(left.owner[members[k]], bool(np.isin(k, marked))):
+            own = pairs[k][pairs[k] < len(number)]
+            component = make_component(left, positions, classes, members[k], own, free, factor)
+            yield component, number[component.gluing_pair], bool(creased[k])

@@ -1,4 +1,5 @@
-"""Take bodies with many handles, as plates full of holes, apart into their sides, or into clusters.
+"""Take bodies with many handles, as plates full of holes, apart into their sides, or into clusters; and thin walls into
+both of theirs.
 
 A cut that opens a hundred handles leaves a chart that has no room for the walls between them. A cluster is what is
 nearest, over the surface, to its centre: struts come apart half way between their joints, where two centres are equally
@@ -13,8 +14,12 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..analysis.feature_edges import fold_angles
 from ..mesh.gluing import Gluing, components, corner_classes
-from .component import SMOOTH, Topology, classify
+from ..mesh.surface import Surface
+from ..walls.two_sides import wall_edges
+from .component import SMOOTH, SideFinder, Topology, classify
+from .crease_sides import hard_sides
 from .developable_nets import HARD
+from .gluing_facts import seen_parts
 from .hole_filling import hole_boundaries
 
 # A component with more handles comes apart.
@@ -41,6 +46,22 @@ def partition_pairs(gluing: Gluing, positions: np.ndarray, one_sided: np.ndarray
         return np.zeros(len(gluing.first), dtype=bool)
     gone, settled = _sides(gluing, positions, one_sided, crowded)
     return gone | cluster_borders(gluing, positions, one_sided, crowded & ~settled)
+
+
+def wall_pairs(
+    surface: Surface, gluing: Gluing, positions: np.ndarray, gone: np.ndarray, search: SideFinder
+) -> np.ndarray:
+    """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which thin walls that are searched come
+    apart into their two sides: a cup, a shirt. What has a hard surface, as a board, comes apart along its creases.
+
+    positions (n,3) in a unit box
+    """
+    found = np.zeros(len(gone), dtype=bool)
+    for part, number, creased in seen_parts(surface, gluing, positions, gone, search):
+        wall = wall_edges(part.positions, part.triangles, part.pair, part.length, ~np.isfinite(part.cost))
+        if wall is not None and not (creased and hard_sides(part) is not None):
+            found[number[wall]] = True
+    return found
 
 
 def _sides(gluing: Gluing, positions, one_sided, crowded) -> tuple[np.ndarray, np.ndarray]:

@@ -2,20 +2,23 @@
 
 Every triangle is placed beside its parent in a tree of neighbours; the motions along the tree are composed by pointer
 doubling. Where a surface has no curvature that is exact to rounding, while the condition of a system of equations
-grows with the fourth power of the length of a strip.
+grows with the fourth power of the length of a strip. The tree crosses the longest edges there are: where the small
+patches at the corners of bevels are curved, what they disagree by is theirs alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from ..mesh.geometry import as_points, cross3, dot3, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, twins
 
 # Triangles that disagree by no more than this, over the extent, lie flat together.
 FLAT = 1e-4
+# Edges shorter than this share of the longest are all the same.
+SHORT = 1e-9
 
 
 def developed(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,9 +62,12 @@ def _motions(local: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
     inner = np.flatnonzero(twin >= 0)
     _, component = graph_components(inner // 3, twin[inner] // 3, m)
     roots = np.unique(component, return_index=True)[1]
+    length = np.abs(np.roll(local, -1, axis=1) - local).ravel()[inner]
+    price = length.max(initial=0.0) / np.maximum(length, SHORT * length.max(initial=0.0) + 1e-300)
+    forest = minimum_spanning_tree(coo_matrix((price, (inner // 3, twin[inner] // 3)), shape=(m, m)).tocsr()).tocoo()
     # One more node, beside all roots, makes the forest a tree.
-    rows = np.concatenate([inner // 3, np.full(len(roots), m), roots])
-    columns = np.concatenate([twin[inner] // 3, roots, np.full(len(roots), m)])
+    rows = np.concatenate([forest.row, np.full(len(roots), m), roots])
+    columns = np.concatenate([forest.col, roots, np.full(len(roots), m)])
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(m + 1, m + 1)).tocsr()
     parent = breadth_first_order(graph, m, directed=False)[1][:m].astype(np.int64)
     parent[roots] = roots
