@@ -172,7 +172,7 @@ def cap_borders(component: CutComponent) -> np.ndarray:
 def _has_clear_net(component: CutComponent) -> bool:
     unrolled = net(component)
     found = None if unrolled is None else unrolled.up_to(unrolled.most)
-    if found is None or found.is_frayed:
+    if found is None or found.winds:
         return False
     # Corners of bevels do not lie flat, and what covers itself for that is little.
     flat, corners, _ = _laid_out(component, found.cut, np.ones(len(component.triangles), dtype=bool))

@@ -331,8 +331,8 @@ class _Cutter:
 
     @staticmethod
     def _is_torn(found: Net, component: CutComponent, topology: Topology, k: int) -> bool:
-        """Whether a net of component k is all slits."""
-        return found.is_frayed or (topology.boundaries[k] > 0 and found.is_comb(_needed(component, topology, k)))
+        """Whether a net of component k is slit at every segment of a band, or winds along a border."""
+        return found.winds or (topology.boundaries[k] > 0 and found.is_comb(_needed(component, topology, k)))
 
     def _search_component(
         self, component: CutComponent, topology: Topology, k: int, search: SeamFinder

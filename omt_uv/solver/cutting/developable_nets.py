@@ -50,12 +50,15 @@ ACROSS = 1.5
 # A net to more corners whose slits are longer, next to the side of a square with the area of the surface, is a comb.
 TEETH = 12
 LONG_TEETH = 1.0
+# One to as many corners that are hardly curved winds if they turn by less than this share of what they do in all.
+WINDS = 0.5
 
 
 @dataclass(frozen=True)
 class Net:
     """A cut (e,) bool that unrolls a component through its corners tips (k,), the shortest by the cost (e,) of edges,
-    which may lay the component on itself; held (k,) : the curvature at each corner, in radians, or less."""
+    which may lay the component on itself; held (k,) : the curvature at each corner, in radians, or at
+    least so much around it."""
 
     component: CutComponent
     cut: np.ndarray
@@ -91,10 +94,10 @@ class Net:
         return self.has_teeth and self.length - needed > LONG_TEETH * side
 
     @property
-    def is_frayed(self) -> bool:
-        """Whether this net ends at so many corners that are hardly curved: in slits across the border of a sheet."""
-        degree = np.bincount(self.component.ends[self.cut].ravel(), minlength=self.component.vertex_count)
-        return int(np.count_nonzero((degree[self.tips] == 1) & (self.held < CURVED))) > TEETH
+    def winds(self) -> bool:
+        """Whether this net goes to so many corners that are hardly curved, to either side: along a border of cloth."""
+        slight = self.held[np.abs(self.held) < CURVED]
+        return len(slight) > TEETH and bool(abs(slight.sum()) < WINDS * np.abs(slight).sum())
 
     def spread_out(self) -> Net:
         """This net or, where the component laid flat along it lies on itself, the shortest of some others along which
@@ -133,12 +136,12 @@ def net(component: CutComponent) -> Net | None:
         found = rounded_corners(component, signed, area)
         folded, enter = fold > BENT, np.zeros(len(fold))
         tips = np.zeros(0, np.int64) if found is None else found
-        curvature = np.full(len(curvature), CURVED)
+        signed = np.full(len(signed), CURVED)
     # A closed surface needs a cut of two edges at least.
     if len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
     cost = np.where(folded, component.cost, ACROSS * component.cost + enter) * net_factors(component, folded)
-    return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost, curvature[tips])
+    return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost, signed[tips])
 
 
 def tight_edges(component: CutComponent, fold: np.ndarray) -> np.ndarray:

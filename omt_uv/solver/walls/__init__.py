@@ -1,12 +1,13 @@
-"""Thin walls: bodies that are a sheet with a thickness, and where their two sides come apart.
+"""Thin walls: bodies with a small thickness everywhere, and where their two sides come apart.
 
 Imports solver.mesh and solver.linalg.
-Main names: wall_edges.
+Main names: wall_edges, Faces.
 """
 
 from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
+    opposite="Faces",
     two_sides="wall_edges",
 )

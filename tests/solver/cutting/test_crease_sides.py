@@ -8,9 +8,10 @@ import numpy as np
 import polygons
 import pytest
 from short_cuts import component_of
+from thin_walls import rounded_box, thickened
 
 from omt_uv.solver.analysis.feature_edges import fold_angles
-from omt_uv.solver.cutting import crease_sides
+from omt_uv.solver.cutting import crease_sides, developable_nets
 from omt_uv.solver.cutting.component import SMOOTH, TurnedCopies, lone_edges
 from omt_uv.solver.cutting.crease_sides import cap_borders, hard_borders, hard_sides, side_borders
 from omt_uv.solver.cutting.gluing_facts import in_unit_box
@@ -568,3 +569,42 @@ def test_what_has_joined_a_side_that_lies_apart_lies_apart_itself(unrolls, monke
         np.array([2.0, 1.0]),
     )
     assert left.tolist() == [False, any(unrolls[1:])]
+
+
+@pytest.mark.parametrize("segments", [2, 5, 8])
+@pytest.mark.parametrize(("size", "radius"), [((1, 1, 1), 0.06), ((1, 0.5, 0.2), 0.06), ((0.2, 0.2, 1), 0.02)])
+def test_a_box_with_rounded_edges_is_one_net_however_many_segments_these_have(size, radius, segments):
+    surface = meshes.polygon_surface(*rounded_box(size, radius, segments))
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
+    assert len(found.charts) == 1 and found.maps[0].folds == 0
+    assert found.maps[0].angle_mean < 1.02
+
+
+def test_what_is_curved_at_rounded_corners_moves_nothing_else():
+    V, quads = rounded_box((1, 0.5, 0.2), 0.06, 3)
+    F = polygons.cut(quads)[0]
+    body = component_of(V, F)
+    unrolled = developable_nets.net(body)
+    flat, corners, _ = crease_sides._laid_out(body, unrolled.cut, np.ones(len(F), bool))
+    # Faces of the box, and of the bands along its edges, are as they were.
+    in_corner = (np.abs(V) > np.array([1, 0.5, 0.2]) - 0.06 + 1e-9).all(axis=1)
+    kept = ~in_corner[F].any(axis=1)
+    assert kept.mean() > 0.2
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        before = np.linalg.norm(body.positions[body.triangles[:, a]] - body.positions[body.triangles[:, b]], axis=1)
+        after = np.abs(flat[corners[:, a]] - flat[corners[:, b]])
+        # They meet the corners, which are of that size.
+        np.testing.assert_allclose(after[kept], before[kept], atol=0.02)
+
+
+@pytest.mark.parametrize("count", [30, 40, 60])
+def test_a_net_that_winds_along_the_border_of_cloth_is_none(count):
+    V, F = meshes.grid(count, count, 2.0, 2.0)
+    cloth = component_of(*thickened(np.column_stack([V[:, :2], 0.2 * np.sin(4 * V[:, 0])]), F, 0.05))
+    assert developable_nets.net(cloth).winds and not crease_sides._has_clear_net(cloth)
+    # The border comes off in strips that are whole.
+    border = side_borders(cloth, *hard_sides(cloth))
+    assert border.any() and sides(cloth, border).max() + 1 <= 6
+    for body in (meshes.cube(), bevelled_cylinder(), prism(np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))):
+        unrolled = developable_nets.net(component_of(*body))
+        assert unrolled is None or not unrolled.winds

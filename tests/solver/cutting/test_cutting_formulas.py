@@ -269,6 +269,16 @@ def reflex_corners(body, fold):
     return {(t, v) for t, f in enumerate(body.triangles) for v in f if angle[side[t], v] > hard_surface.REFLEX}
 
 
+def steps_from(start, edges, length):
+    """How far along edges every vertex of these is from the nearest of a start, by going on until nothing is nearer."""
+    far = {int(v): np.inf for ends in edges.values() for v in ends} | dict.fromkeys(map(int, start), 0.0)
+    for _ in far:
+        for k, (tail, head) in edges.items():
+            for u, v in ((tail, head), (head, tail)):
+                far[int(v)] = min(far[int(v)], far[int(u)] + length[k])
+    return far
+
+
 def sides(body, joined):
     """A number for every triangle, the same where the edges `joined` (e,) join them, by a walk."""
     label = np.arange(len(body.triangles))
@@ -321,6 +331,9 @@ def test_figures_of_sides_are_sums_over_them(body, seed):
         twice, times = np.unique(body.ends[edges], return_counts=True)
         beside = set(body.ends[[k for k in np.flatnonzero(border) if chain[k] != c]].ravel().tolist())
         alone = [v for v, t in zip(twice, times, strict=True) if t == 2 and v not in beside]
+        # What is near its ends belongs to the corners there.
+        far = steps_from(set(twice) - set(alone), {k: body.ends[k] for k in edges}, body.length)
+        alone = [v for v in alone if far[v] > crease_sides.CORNER * length[c]]
         assert turned[c] == pytest.approx(curvature[alone].sum(), abs=1e-12)
 
 
@@ -359,3 +372,19 @@ def test_what_is_laid_out_keeps_its_lengths_and_tells_where_it_does_not_close():
         np.testing.assert_allclose(there, own, atol=1e-12)
     ball = component_of(*meshes.icosphere(1))
     assert crease_sides._laid_out(ball, np.zeros(len(ball.pair), bool), np.ones(len(ball.triangles), bool))[2] > 0.01
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_distances_along_edges_are_those_of_going_on(seed):
+    rng = np.random.default_rng(seed)
+    ends = np.array([e for e in rng.integers(0, 14, (20, 2)) if e[0] != e[1]])
+    ends = np.unique(np.sort(ends, axis=1), axis=0)
+    length = rng.random(len(ends))
+    start = np.zeros(14, bool)
+    start[rng.integers(0, 14, 2)] = True
+    far = steps_from(np.flatnonzero(start), dict(enumerate(ends)), length)
+    found = cut_graph.distance_from(start, ends, length)
+    np.testing.assert_allclose(found, [far.get(v, np.inf) for v in range(14)])
+    assert np.isinf(cut_graph.distance_from(np.zeros(14, bool), ends, length)).all()
+    # What has no length is an edge all the same.
+    assert (cut_graph.distance_from(start, ends, 0 * length)[np.isfinite(found)] < 1e-290).all()

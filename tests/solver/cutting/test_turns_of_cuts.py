@@ -17,8 +17,8 @@ class Net:
 
     most, cut, tips, has_teeth = 50.0, "net", "tips", True
 
-    def __init__(self, length, comb):
-        self.length, self.comb, self.asked = length, comb, []
+    def __init__(self, length, comb, winds=False):
+        self.length, self.comb, self.winds, self.asked = length, comb, winds, []
 
     def is_comb(self, needed):
         return self.comb and needed < 7
@@ -32,12 +32,13 @@ class Net:
 def best(monkeypatch):
     """The best cut of a part, and what was tried for it."""
 
-    def run(*, length=None, other=10.0, comb=False, boundaries=1, needed=5.0, extremities=6, **given):
+    def run(*, length=None, other=10.0, comb=False, winding=False, boundaries=1, needed=5.0, **given):
+        extremities = given.pop("extremities", 6)
         filled, searched, again, search = (
             given.get(n, n == "search") for n in ("filled", "searched", "again", "search")
         )
         tried = []
-        made = None if length is None else Net(length, comb)
+        made = None if length is None else Net(length, comb, winding)
         monkeypatch.setattr(cuts, "net", lambda component: (tried.append("net"), made)[1])
 
         def plain(component, topology, k, extremities, outline):
@@ -83,6 +84,13 @@ def test_combs_are_no_nets_of_what_has_a_boundary_and_is_searched(best):
     assert best(length=50.0, searched=True, comb=True)[:2] == ("seams", ["net", "search"])
     for given in ({"boundaries": 0}, {"needed": 8.0}, {"searched": False}):
         assert best(**{"length": 50.0, "searched": True, "comb": True} | given)[0] == "net"
+
+
+def test_what_winds_along_a_border_is_no_net_of_what_is_searched(best):
+    for boundaries in (0, 1):
+        found = best(length=50.0, searched=True, winding=True, boundaries=boundaries)
+        assert found[:2] == ("seams", ["net", "search"])
+    assert best(length=50.0, winding=True)[0] == "net"
 
 
 @pytest.mark.parametrize("disk", [True, False])
