@@ -19,7 +19,7 @@ from .topology import twins
 # Samples whose faces are tried for a query,
 CANDIDATES = 4
 # and where walks go on from time to time, so that few that begin at the wrong one do not matter.
-FEW_CANDIDATES = 2
+FEW_CANDIDATES = 1
 # Squared share of the spacing within which a point is on a surface.
 ON_SURFACE = 1e-12
 # Cosine between the normals from which on it is on the right side of a thin part.
@@ -139,6 +139,8 @@ class ClosestPoint:
         k = min(candidates, len(owner))
         _, index = self._tree.query(np.column_stack([points, self.normal_scale * normals]), k=k)
         faces = owner[index.reshape(len(points), k)]
+        if k == 1:
+            return self.walk(points, faces[:, 0])
         _, distance = self.distance(points, faces)
         # The right side first, then the distance.
         back = np.einsum("kcj,kj->kc", self.normals.take(faces, axis=0), normals) < 0

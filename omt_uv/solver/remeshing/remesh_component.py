@@ -19,7 +19,7 @@ from .fitting.retreat import retreated
 from .initial.component_maps import ComponentMaps
 from .initial.initial_mesh import InitialMesh, make_initial_mesh
 from .initial.options import RemeshOptions
-from .relaxation.cvt import relax_cvt
+from .relaxation.cvt import Relaxation, relax_cvt
 from .relaxation.surface_carrier import SurfaceCarrier
 from .relaxation.vertex_balance import balance_vertices
 
@@ -130,15 +130,19 @@ def _relaxed(
     mesh = reach_vertex_count(mesh, start.vertex_count, sizing, allow_folds)
     demand, balanced = None, True
     for k in range(MAX_BALANCES):
-        mesh, _ = yield from part_of(relax_cvt(mesh, SHORT_ROUNDS, carrier), 0.07 + 0.038 * k, 0.038)
+        relaxation = Relaxation(mesh, carrier)
+        mesh, _ = yield from part_of(relaxation.run(SHORT_ROUNDS), 0.07 + 0.038 * k, 0.038)
         if not options.samples_by_measure:
             break
         found = balance_vertices(mesh, carrier, sizing, demand)
         mesh, demand, balanced = found.mesh, found.demand, found.was_balanced
         if balanced:
             break
-    mesh, residual = yield from part_of(relax_cvt(mesh, options.rounds, carrier), 0.3, 0.2)
-    if not balanced:
+    if balanced:
+        # The short rounds are the first ones, and these go on from there.
+        mesh, residual = yield from part_of(relaxation.run(max(options.rounds - SHORT_ROUNDS, 1)), 0.3, 0.2)
+    else:
+        mesh, residual = yield from part_of(relax_cvt(mesh, options.rounds, carrier), 0.3, 0.2)
         # Along jumps of the density that took vertices away again.
         mesh = balance_vertices(mesh, carrier, sizing, demand).mesh
         mesh, residual = yield from part_of(relax_cvt(mesh, SHORT_ROUNDS, carrier), 0.5, 0.07)

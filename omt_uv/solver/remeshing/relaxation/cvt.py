@@ -32,50 +32,72 @@ TRUST_FULLY = 1.3
 CREST_WEIGHT = 4.0
 # Vertices go back to the surface after so many rounds: along the tangents they hardly leave it.
 RETURN_EVERY = 2
-# Rounds of flips after each step; what they leave is for the next.
+# Edges flip as often,
+FLIP_EVERY = 2
+# by one round of flips; what it leaves is for the next.
 FLIP_ROUNDS = 1
 # Relative rise of the energy at which the descent begins anew: triangles flipped.
 RISE = 1e-6
 
 
-def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[tuple[WorkingMesh, float]]:
-    """Relax a mesh on a surface; steps of the mesh, and the mean step of the last round in edge lengths.
+class Relaxation:
+    """A mesh that is relaxed on a surface, and goes on from where it ended: with the samples, and the memory of its
+    descent, that it has.
 
     Boundary vertices should be fixed.
     """
-    triangles, fixed = mesh.triangles.copy(), mesh.fixed
-    twin = mesh.twin.copy()
-    descent = LBFGS()
-    best, residual = np.inf, 0.0
-    normal = vertex_normals(mesh.points, triangles)
-    carrier.begin_at(mesh.points, normal, mesh.near)
-    points, density = carrier.closest(mesh.points, normal)
-    points[fixed] = mesh.points[fixed]
-    for k in range(rounds):
+
+    def __init__(self, mesh: WorkingMesh, carrier: SurfaceCarrier):
+        self._start, self._carrier, self._descent = mesh, carrier, LBFGS()
+        self._triangles, self._twin = mesh.triangles.copy(), mesh.twin.copy()
+        self._normal = vertex_normals(mesh.points, mesh.triangles)
+        carrier.begin_at(mesh.points, self._normal, mesh.near)
+        self._points, self._density = carrier.closest(mesh.points, self._normal)
+        self._points[mesh.fixed] = mesh.points[mesh.fixed]
+        self._best, self._rounds, self._residual = np.inf, 0, 0.0
+
+    def run(self, rounds: int) -> Steps[tuple[WorkingMesh, float]]:
+        """Go on for so many rounds; steps of the mesh, and the mean step of the last round in edge lengths."""
+        mesh, carrier, fixed = self._start, self._carrier, self._start.fixed
+        for k in range(rounds):
+            if mesh.delaunay and self._rounds % FLIP_EVERY == 0:
+                make_delaunay_embedded(self._points, self._triangles, self._twin, mesh.locked, FLIP_ROUNDS)
+            trial = self._points + self._step()
+            self._normal = vertex_normals(trial, self._triangles)
+            if self._rounds % RETURN_EVERY == 0 or k == rounds - 1:
+                trial, self._density = carrier.closest(trial, self._normal)
+            # A vertex that found no place stays where it is.
+            found = ~fixed & np.isfinite(trial).all(axis=1)
+            self._points = np.where(found[:, None], trial, self._points)
+            self._rounds += 1
+            yield Progress("Relaxation", (k + 1) / rounds)
         if mesh.delaunay:
-            make_delaunay_embedded(points, triangles, twin, mesh.locked, FLIP_ROUNDS)
-        if k % SAMPLE_EVERY == 0:
-            correction = _sample_correction(points, triangles, normal, carrier)
-            descent.reset()
-        cells = correction.correct(points, voronoi_cells(points, triangles, density**2, mesh.delaunay))
-        if cells.energy > best * (1 + RISE):
-            descent.reset()
-        best = cells.energy
+            make_delaunay_embedded(self._points, self._triangles, self._twin, mesh.locked)
+        # The mesh that is returned does not change when this one goes on.
+        arrays = self._points, self._triangles.copy(), self._twin.copy()
+        return mesh.turned_into(*arrays, near=carrier.faces), self._residual
+
+    def _step(self) -> np.ndarray:
+        """The next step (n,3) of the descent."""
+        points, normal, fixed = self._points, self._normal, self._start.fixed
+        if self._rounds % SAMPLE_EVERY == 0:
+            # The energy is another one, but so little that what is remembered of its changes still tells the way.
+            self._correction = _sample_correction(points, self._triangles, normal, self._carrier)
+            self._best = np.inf
+        cells = voronoi_cells(points, self._triangles, self._density**2, self._start.delaunay)
+        cells = self._correction.correct(points, cells)
+        if cells.energy > self._best * (1 + RISE):
+            self._descent.reset()
+        self._best = cells.energy
         gradient = _tangential(-2 * cells.moment, normal, fixed)
-        step = descent.direction(points, gradient, 1 / (2 * np.maximum(cells.mass, 1e-300))[:, None])
-        step = _tangential(step, normal, fixed)
-        step, residual = _bounded(step, cells.shortest, triangles)
-        trial = points + step
-        normal = vertex_normals(trial, triangles)
-        if k % RETURN_EVERY == 0 or k == rounds - 1:
-            trial, density = carrier.closest(trial, normal)
-        # A vertex that found no place stays where it is.
-        found = ~fixed & np.isfinite(trial).all(axis=1)
-        points = np.where(found[:, None], trial, points)
-        yield Progress("Relaxation", (k + 1) / rounds)
-    if mesh.delaunay:
-        make_delaunay_embedded(points, triangles, twin, mesh.locked)
-    return mesh.turned_into(points, triangles, twin, near=carrier.faces), residual
+        step = self._descent.direction(points, gradient, 1 / (2 * np.maximum(cells.mass, 1e-300))[:, None])
+        step, self._residual = _bounded(_tangential(step, normal, fixed), cells.shortest, self._triangles)
+        return step
+
+
+def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[tuple[WorkingMesh, float]]:
+    """Relax a mesh on a surface for so many rounds; see `Relaxation`."""
+    return (yield from Relaxation(mesh, carrier).run(rounds))
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray, fixed: np.ndarray) -> np.ndarray:

@@ -42,12 +42,34 @@ def voronoi_cells(
     w, double = _circumcentre(square)
     if not delaunay:
         w = np.full(square.shape, 1 / 3)
-    # One number for all where it is the same everywhere.
-    rho = list(density.take(corner)) if np.ptp(density) else [density[:1]] * 3
+    if np.ptp(density):
+        mass, moment, energy, middle = _parts(side, square, w, double, density.take(corner))
+    else:
+        middle = np.full_like(double, density[0])
+        mass, moment, energy = _even_parts(side, square, w, double, float(density[0]))
+    flat = corner.ravel()
+    sums = [np.bincount(flat, moment[:, k].ravel(), n) for k in range(3)]
+    # Where flips could not reach Delaunay cells may be small, or less than nothing: a step must not divide by that.
+    typical = np.bincount(flat, np.tile(double / 6 * middle, 3), n)
+    cells = np.bincount(flat, mass.ravel(), n)
+    return VoronoiCells(
+        np.maximum(cells, np.maximum(MIN_SHARE * typical, 1e-9 * typical.mean())),
+        np.stack(sums, axis=1),
+        energy,
+        np.sqrt(np.minimum.reduce(square)),
+    )
+
+
+def _parts(
+    side: np.ndarray, square: np.ndarray, w: np.ndarray, double: np.ndarray, rho: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+    """Mass (3,m) and moment (3,3,m) of what each corner has of its triangle, their energy, and the density in the
+    middle (m,); sides (3,3,m) opposite to the corners with their squares (3,m), shares w (3,m) of the centre, twice the
+    areas (m,), densities (3,m)."""
     # Geometric means: where a long edge leads from many small cells to a few large ones, the arithmetic mean
     # would say that half of it belongs to the small ones, and these would draw vertices from the large.
     middle, half = np.cbrt(rho[0] * rho[1] * rho[2]), w * (double / 4)
-    mass, moment, energy = np.empty_like(square), np.empty_like(p), 0.0
+    mass, moment, energy = np.empty_like(square), np.empty_like(side), 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         between = (square[j] + square[k] - square[i]) / 2
@@ -64,17 +86,27 @@ def voronoi_cells(
             reach = square[b] * ((1 + 2 * w[a]) / 4) + w[b] / 2 * between + far
             energy += float((half[b] * total) @ reach) / 18
         moment[i] = (along[0] + to_centre * w[j]) * side[k] - (along[1] + to_centre * w[k]) * side[j]
-    flat = corner.ravel()
-    sums = [np.bincount(flat, moment[:, k].ravel(), n) for k in range(3)]
-    # Where flips could not reach Delaunay cells may be small, or less than nothing: a step must not divide by that.
-    typical = np.bincount(flat, np.tile(double / 6 * middle, 3), n)
-    cells = np.bincount(flat, mass.ravel(), n)
-    return VoronoiCells(
-        np.maximum(cells, np.maximum(MIN_SHARE * typical, 1e-9 * typical.mean())),
-        np.stack(sums, axis=1),
-        energy,
-        np.sqrt(np.minimum.reduce(square)),
-    )
+    return mass, moment, energy, middle
+
+
+def _even_parts(
+    side: np.ndarray, square: np.ndarray, w: np.ndarray, double: np.ndarray, rho: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Mass, moment and energy as of `_parts` where the density is the same everywhere: two ends of a side have as much
+    of its triangle, and what depends on where on the side they are cancels."""
+    half = w * (double * (rho / 4))
+    mass, moment, energy = np.empty_like(square), np.empty_like(side), 0.0
+    far = []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        between = square[j] + square[k] - square[i]
+        far.append(w[j] ** 2 * square[k] + w[k] ** 2 * square[j] + w[j] * w[k] * between)
+        np.add(half[j], half[k], out=mass[i])
+        to_centre = mass[i] / 3
+        moment[i] = (half[k] / 6 + to_centre * w[j]) * side[k] - (half[j] / 6 + to_centre * w[k]) * side[j]
+    for i in range(3):
+        energy += float(half[i] @ (square[i] + far[(i + 1) % 3] + far[(i + 2) % 3])) / 6
+    return mass, moment, energy
 
 
 def _circumcentre(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
