@@ -172,12 +172,12 @@ def test_a_second_queue_waits_for_the_first_and_may_begin_when_that_was_stopped(
     assert [job.state for job in queue.state.jobs] == ["DONE", "DONE"] and not _watching()
 
 
-def test_nothing_of_a_queue_is_left_when_the_add_on_goes(package, monkeypatch):
+def test_nothing_is_left_of_a_queue_that_is_forgotten_on_its_way(package, monkeypatch):
     _under_way(package, monkeypatch)
     queue = package("session.queue")
     steps = queue.state.jobs[0].steps
     assert len(_watching()) == 1
-    package("registration")._clear(None)
+    queue.forget()
     assert queue.state is None and steps.gi_frame is None and not _watching()
 
 

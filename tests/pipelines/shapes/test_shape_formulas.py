@@ -14,7 +14,7 @@ from omt_uv.pipelines.magnify import Region
 from omt_uv.pipelines.regions import detail
 from omt_uv.pipelines.shapes import distance, match, partition, strain
 from omt_uv.pipelines.shapes.cell_attributes import carry_to_cells
-from omt_uv.pipelines.shapes.landmark_pairs import pairs_of
+from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, Pairs, pairs_of
 from omt_uv.settings import PartitionSettings
 from omt_uv.solver.mesh.geometry import face_areas, face_normals
 from omt_uv.solver.mesh.surface import chosen_triangles, triangle_surface
@@ -214,6 +214,21 @@ def test_small_parts_go_along_with_a_similarity(mirrored):
         for rows in (np.isin(F, part.rest).all(axis=1),):
             before, after = (np.linalg.det(x[F[rows]] - x[F[rows]].mean(axis=(0, 1))) for x in (V, wrapped))
             assert np.isfinite(after).all() and before.any()
+
+
+def test_landmarks_have_the_numbers_of_the_part_the_first_vertex_too():
+    """And what is on another part a number that no vertex of this one has; places without a vertex stay so."""
+    V, F = two_parts()
+    surface = triangle_surface(V, F)
+    part = match.largest_part(surface, "source")
+    given = [*range(len(V)), -1]
+    points = tuple(LandmarkPoint(f"{k}", k, None if k >= 0 else (0.0, 0.0, 1.0)) for k in given)
+    renamed = match._renamed(Pairs(points, points), part, part)
+    place = {k: i for i, k in enumerate(part.used.tolist())}
+    expected = [-1 if k < 0 else place.get(k, len(part.used)) for k in given]
+    for side in (renamed.source, renamed.target):
+        assert [point.vertex for point in side] == expected
+        assert [(p.name, p.position) for p in side] == [(p.name, p.position) for p in points]
 
 
 def horn(before, after):
