@@ -84,7 +84,8 @@ def registered(request):
 
 @pytest.fixture(autouse=True)
 def empty_scene(request):
-    """Every test of Blender starts from an empty scene; this keeps add-ons enabled."""
+    """Every test of Blender starts from an empty scene; this keeps add-ons enabled. Whatever it does, and however
+    often, Blender calls nobody twice for one thing then."""
     if not needs_blender(request.path):
         yield
         return
@@ -96,6 +97,9 @@ def empty_scene(request):
     yield
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
+    for name in ("depsgraph_update_post", "undo_post", "redo_post", "load_pre", "load_post"):
+        called = getattr(bpy.app.handlers, name)
+        assert all(called.count(function) == 1 for function in called), f"{name} calls somebody twice: {list(called)}"
 
 
 @pytest.hookimpl(trylast=True)

@@ -40,13 +40,20 @@ def exported_meshes(objects: Objects, everything: bool) -> list[bpy.types.Object
 
 def _select_only(objects: Objects) -> None:
     """Select these objects and no others."""
-    for obj in bpy.context.view_layer.objects:
+    layer, always = bpy.context.view_layer, bpy.context.scene.collection.objects
+    # What was linked a moment ago comes in only then, and comes selected.
+    layer.update()
+    for obj in layer.objects:
         obj.select_set(False)
     for obj in objects:
         obj.hide_set(False)
         obj.hide_viewport = obj.hide_select = False
         obj.select_set(True)
-    bpy.context.view_layer.objects.active = objects[0]
+        if not obj.select_get() and obj.name not in always:
+            # All its collections are hidden, or are not to be selected.
+            always.link(obj)
+            obj.select_set(True)
+    layer.objects.active = objects[0]
 
 
 def _write_obj(path: Path, objects: Objects, everything: bool) -> list[str]:

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .run import Watch
 
 
 class Job:
@@ -14,6 +18,7 @@ class Job:
         self.name, self.state, self.progress, self.reason = name, "WAITING", 0.0, ""
         self.warnings: list[str] = []
         self.steps: Iterator | None = None
+        self._watch: Watch | None = None
         self._began = 0.0
 
     @property
@@ -21,10 +26,15 @@ class Job:
         """How long it has been running."""
         return time.monotonic() - self._began
 
-    def begin(self, steps: Iterator) -> Iterator:
-        """Its work starts now."""
-        self.steps, self.state, self._began = steps, "RUNNING", time.monotonic()
+    def begin(self, steps: Iterator, watch: Watch | None = None) -> Iterator:
+        """Its work starts now, on what is watched from now on, if anything is."""
+        self.steps, self.state, self._began, self._watch = steps, "RUNNING", time.monotonic(), watch
         return steps
+
+    def check(self, thoroughly: bool = False) -> None:
+        """Raise `run.Disturbed` if the object is no longer what the work began with."""
+        if self._watch is not None:
+            self._watch.check(thoroughly)
 
     def end(self, state: str, reason: str = "") -> None:
         self.state, self.reason = state, reason
@@ -36,7 +46,9 @@ class Job:
         close = getattr(self.steps, "close", None)
         if close is not None:
             close()
-        self.steps = None
+        if self._watch is not None:
+            self._watch.close()
+        self.steps = self._watch = None
         if self.state == "RUNNING":
             self.state = "WAITING"
 
@@ -53,6 +65,17 @@ class Queue:
         """The job that runs, or the next one."""
         return next((job for job in self.jobs if job.state in {"RUNNING", "WAITING"}), None)
 
+    @property
+    def is_running(self) -> bool:
+        """Whether it will go on by itself."""
+        return not self.is_over and not self.is_stopped
+
+    def close(self) -> None:
+        """Throw away what is left of its work; what is done is kept."""
+        for job in self.jobs:
+            job.close()
+        self.is_over = True
+
 
 state: Queue | None = None
 
@@ -61,3 +84,11 @@ def stop() -> None:
     """Begin no other job; what is done is kept."""
     if state is not None:
         state.is_stopped = True
+
+
+def forget() -> None:
+    """Throw the queue away, also when the add-on goes."""
+    global state
+    if state is not None:
+        state.close()
+    state = None

@@ -93,10 +93,11 @@ class Run:
 
 
 class Watch:
-    """Notices when objects that a run works on change, vanish, or are exchanged by undo."""
+    """Notices when objects that a run works on change, vanish, or are exchanged by undo; any_mode: that of the scene
+    may change, as somebody may work on other objects."""
 
-    def __init__(self, context: bpy.types.Context, objects: list):
-        self._mode = context.mode
+    def __init__(self, context: bpy.types.Context, objects: list, any_mode: bool = False):
+        self._mode = None if any_mode else context.mode
         self._objects = [(obj, obj.name) for obj in objects]
         self._marks = self._fingerprints()
         self._suspect = self._lost = False
@@ -120,7 +121,7 @@ class Watch:
         try:
             if any(bpy.data.objects.get(name) != obj for obj, name in self._objects):
                 raise Disturbed("An object was renamed or deleted meanwhile")
-            if bpy.context.mode != self._mode:
+            if self._mode not in (None, bpy.context.mode):
                 raise Disturbed("The mode was changed meanwhile")
             if (thoroughly or self._suspect) and self._fingerprints() != self._marks:
                 raise Disturbed("The mesh was changed meanwhile")

@@ -116,6 +116,20 @@ def test_text_is_drawn_where_it_is_asked_for(package):
     assert not [c for c in bpy.data.curves if c.name.startswith("OMT")]
 
 
+@pytest.mark.parametrize("shown", [["written"] * 3, ["written", "AREA", "written"], ["AREA", "AREA", "SHEAR"]])
+def test_what_is_shown_again_is_listened_for_once_and_taken_back_whole(patch, package, shown):
+    overlay, read_objects = package("display.overlay"), package("operators.base").read_objects
+    for what in shown:
+        if what == "written":
+            overlay.show_written(bpy.context)
+        else:
+            overlay.show(bpy.context, read_objects(bpy.context), what)
+    for kind, function in overlay._handlers():
+        assert list(kind).count(function) == 1
+    overlay.hide(bpy.context)
+    assert not any(function in kind for kind, function in overlay._handlers())
+
+
 def test_no_uvs_is_one_message(package):
     scenes.bump()
     for operator in (bpy.ops.uv.omt_overlay, bpy.ops.uv.omt_histogram, bpy.ops.uv.omt_density_get):

@@ -146,6 +146,28 @@ def test_levels_stand_below_a_collection_of_this_file(package, monkeypatch, libr
     assert all(obj.users_collection == (made,) for obj in made.objects)
 
 
+@pytest.mark.parametrize("levels", [1, 3])
+def test_levels_know_which_object_of_a_group_they_were_made_of(package, levels):
+    """Names come level by level, each for every object of the group in turn."""
+    remesh = package("blender.remesh_objects")
+    group = [scenes.cube(f"it {k}") for k in range(2)]
+    names = [scenes.cube(f"{level} of {k}").name for level in range(levels) for k in range(2)]
+    remesh.mark_source(group, names)
+    for name in names:
+        assert bpy.data.objects[name][remesh.SOURCE] == group[int(name[-1])], name
+
+
+@pytest.mark.parametrize("room", ["display.overlay", "display.colour_bar", "session.last_run", "session.queue"])
+def test_every_room_forgets_when_the_add_on_goes(package, monkeypatch, room):
+    gone, registration = [], package("registration")
+    # Keys and presets stay for other tests.
+    monkeypatch.setattr(package("panels.keymap"), "unregister", lambda: None)
+    monkeypatch.setattr(registration, "unregister_folder", lambda: None)
+    monkeypatch.setattr(package(room), "forget", lambda: gone.append(room))
+    registration._clear(None)
+    assert gone == [room]
+
+
 class _Data:
     """`bpy.data`, whose objects keep what is told of them, first of all, elsewhere."""
 

@@ -318,3 +318,26 @@ def test_what_is_said_of_many_objects_is_said_once(package, count):
         "2 of none",
         "3 of none",
     ]
+
+
+@pytest.mark.parametrize("own", [(), ("Shear",), ("Shear", "Overlap"), ("Area error", "Shear", "Folded faces")])
+def test_rows_that_an_operator_says_itself_stand_for_those_measured_and_are_never_marked(package, monkeypatch, own):
+    """A sign of what is out of bounds belongs to the figure that was judged, not to another one of its name."""
+    base, last_run = package("operators.base"), package("session.last_run")
+    obj = scenes.bump(4, 4)
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    measured = last_run.Figures(
+        (("Area error", "a"), ("Shear", "b"), ("Islands", "1")), frozenset({"Area error", "Shear"})
+    )
+    overlap = last_run.Figures((("Overlap", "c"),), frozenset({"Overlap"}))
+    monkeypatch.setattr(base, "figures_of", lambda *of: measured)
+    operator = scenes.stand_in("uv.omt_refine")
+    monkeypatch.setattr(type(operator), "_gate", lambda self, readings: overlap)
+    monkeypatch.setattr(type(operator), "finish", lambda self, context, result: None)
+    operator.said = tuple((name, "own") for name in own)
+    operator._finish(bpy.context, None, 1.0)
+    summary = last_run.state.summary
+    names = [name for name, _ in summary.rows]
+    assert len(names) == len(set(names)) and dict(summary.rows).items() >= dict.fromkeys(own, "own").items()
+    assert summary.beyond == {"Area error", "Shear", "Overlap"} - set(own)
+    assert names[: len(own)] == list(own) and set(names) == {"Area error", "Shear", "Islands", "Overlap", "Time", *own}

@@ -24,6 +24,31 @@ def test_words_keep_their_values_and_are_of_the_tab(package, language):
         assert not re.search(r"^\s|\s$", words)
 
 
+# What is told by one word, though by two in English, but for singular and plural.
+ONE_WORD = {
+    "de_DE": ("Inspect Checking", "Sphere Ball", "Margin Distance", "Scope Region", "Get Reading", "Size Figure",
+              "Even, Well Shaped/Uniform", "Show Warped Image/Show Warped", "Of From", "Relax Relaxation",
+              "Points Vertices", "Wrap Wrapping"),
+    "ja_JP": ("Arrange Layout", "Magnify Magnification", "Further Regions/More Regions", "Auto Automatic",
+              "Nothing None", "Relax Relaxation", "Distance distances", "Invert Flipped Inverted"),
+}  # fmt: skip
+
+
+def _singular(text: str) -> str:
+    return re.sub(r"s\b", "", text.replace("vertices", "vertex")).lower()
+
+
+@pytest.mark.parametrize("language", ONE_WORD)
+def test_what_differs_has_words_that_differ(package, language):
+    """Two settings of one name would be taken for each other, as From and To would, if both were told as an end."""
+    table, same = package("panels.translations.registered").LANGUAGES[language], {}
+    for text, words in table.items():
+        same.setdefault(words, []).append(text)
+    known = [set(re.split("/", pair) if "/" in pair else pair.split()) for pair in ONE_WORD[language]]
+    for words, texts in same.items():
+        assert len({_singular(text) for text in texts}) == 1 or set(texts) in known, (words, texts)
+
+
 # What measures, compares and magnifies, with the maps of the papers and the globe.
 SPOKEN = (
     "uv.omt_magnify uv.omt_region_add uv.omt_region_remove object.omt_weights uv.omt_measure uv.omt_overlay "

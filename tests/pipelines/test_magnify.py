@@ -13,7 +13,7 @@ from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.magnify import Magnified, Region, Shares, magnify, warped_picture, whole_factor
 from omt_uv.pipelines.regions.detail import box_of
 from omt_uv.settings import MagnifySettings
-from omt_uv.solver.errors import ShareError, WeightError
+from omt_uv.solver.errors import FoldedUVError, ShareError, WeightError
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.parameterization.chart_indices import CornerPins
@@ -197,3 +197,19 @@ def test_what_was_left_out_covers_nothing_on_a_subdivision_either(monkeypatch):
     region, rows = SimpleNamespace(surface=surface, subdivision="some"), np.array([0, 2])
     assert magnify_pipeline.uv_areas(region, (rows,), np.arange(9), np.zeros((9, 2))).tolist() == [6, 4]
     assert magnify_pipeline.uv_areas(region, (rows,), np.arange(3, 9), np.zeros((6, 2))).tolist() == [0, 4]
+
+
+@pytest.mark.parametrize("boundary", ["own", "rectangle", "disk", "square"])
+@pytest.mark.parametrize("which", [0, 1])
+def test_folded_islands_are_refused_whatever_they_are_to_fill(which, boundary):
+    """By the object they are of, and their faces as the object counts them: a map would unfold them without a word."""
+    V, F = meshes.grid(10, 10)
+    uv = V[:, :2].copy()
+    middle = int(np.argmin(np.linalg.norm(uv - [0.5, 0.5], axis=1)))
+    uv[middle] += 3 * (uv.max(axis=0) - uv.min(axis=0)) / 10
+    bad = region(V, F, spot(V, 0.3), uv)
+    regions = [plate(2.0), bad] if which else [bad, plate(2.0)]
+    with pytest.raises(Refusal, match="fold") as told:
+        drain(magnify(regions, MagnifySettings(**DRAFT, boundary=boundary, source="uv")))
+    assert told.value.index == which and isinstance(told.value.error, FoldedUVError)
+    assert set(told.value.error.elements) <= set(np.flatnonzero(np.isin(F, middle).any(axis=1)))

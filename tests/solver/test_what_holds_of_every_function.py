@@ -16,6 +16,7 @@ import inspect
 import os
 from pathlib import Path
 
+import laws_of_meshes
 import numpy as np
 import pytest
 import recorded_calls
@@ -28,6 +29,8 @@ from omt_uv.solver import progress
 from omt_uv.solver.progress import drain
 
 LAWS = Path(__file__).with_name("laws.tsv")
+# Laws of meshes that are told otherwise, of private functions, too.
+OTHERWISE = Path(__file__).with_name("laws_of_meshes.tsv")
 FOUND = Path(__file__).with_name("found.tsv")
 FEWER = os.environ.get("OMT_UV_ACCEPT") == "fewer"
 ACCEPT = bool(os.environ.get("OMT_UV_ACCEPT")) and not FEWER
@@ -82,9 +85,12 @@ def run_all():
                 patch.setattr(module, "drain", _drain_ahead)
         patch.setattr(progress, "drain", _drain_ahead)
         kept = stack.enter_context(recorded(3))
+        kept.all = recorded_calls.Record(2)
+        stack.enter_context(recorded_calls.watching(kept.all, recorded_calls.modules(), private=True))
         stack.enter_context(recorded_calls.watching(told, [*recorded_calls.modules(), solver]))
         for name, run in solver_runs.RUNS.items():
             kept.next_run()
+            kept.all.next_run()
             told.next_run(SYMMETRIC * (name in ("with_symmetry", "bodies_cut_open")))
             run()
     kept.told = told.figures
@@ -324,6 +330,34 @@ def test_laws_that_hold_are_those_of_the_table():
         LAWS.write_text("".join(f"{line}\n" for line in told if line not in missing))
         return
     assert not missing, "\n".join(sorted(missing))
+
+
+def all_laws_of_meshes(kept):
+    """Lines of functions, laws, and the words that hold for all calls that are kept."""
+    found = []
+    for name, calls in sorted(kept.all.calls.items()):
+        if all(is_quick(call) and laws_of_meshes.is_quick(call) for call in calls):
+            each = [set(laws_of_meshes.all_that_hold(call).items()) for call in calls]
+            found += ["\t".join([name, *law]) for law in sorted(set.intersection(*each))]
+    return found
+
+
+def test_laws_of_meshes_told_otherwise_are_those_of_the_table():
+    """Tiny and huge, mirrored, turned over, numbered otherwise, with a loose vertex, and two of it side by side."""
+    calls = record().all.calls
+    if ACCEPT:
+        OTHERWISE.write_text("".join(f"{line}\n" for line in all_laws_of_meshes(record())))
+    told = [line.split("\t") for line in OTHERWISE.read_text().splitlines()]
+    assert len(told) > 1000
+    missing = [
+        "\t".join(line)
+        for line in told
+        if any(laws_of_meshes.held(call, line[1]) != line[2] for call in calls.get(line[0], [])) or line[0] not in calls
+    ]
+    if FEWER:
+        OTHERWISE.write_text("".join("\t".join(line) + "\n" for line in told if "\t".join(line) not in missing))
+        return
+    assert not missing, "\n".join(missing)
 
 
 # ---- what is found ----------------------------------------------------------------------------------------------

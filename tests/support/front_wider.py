@@ -261,9 +261,9 @@ def in_a_window(folder: Path) -> Iterator[tuple[str, object]]:
             twin_scenes.begin(folder, "Closed Band" if name != "uv.omt_magnify" else "Band")
             window, operator, k = Window("VIEW_3D"), scenes.stand_in(name, **settings), 0
             state = operator.invoke(window, event("LEFTMOUSE"))
-            while state == {"RUNNING_MODAL"}:
+            while not state & {"FINISHED", "CANCELLED"}:
                 k += 1
-                state = operator.modal(window, event("TIMER" if k < most else "ESC"))
+                state = operator.modal(window, event("TIMER" if k != most else "ESC"))
             told = [text for _, text in operator.reports]
             yield f"{name} in a window {most}", [sorted(state), told, front_runs.left()]
     for key in ("RET", "ESC"):

@@ -57,6 +57,8 @@ def in_single_steps(monkeypatch, package) -> None:
     for function in (run.Run.advance, live.Session.follow):
         monkeypatch.setattr(inspect.unwrap(function), "__defaults__", (0.0,))
     monkeypatch.setattr(run, "threads", False)
+    # What the queue takes, too.
+    monkeypatch.setattr(run, "SLICE", 0.0)
     monkeypatch.setattr(package("operators.live"), "LOOK_EVERY", -1.0)
     # A queue looks at the clock before each step: every second time its slice is over.
     ticks = itertools.count()

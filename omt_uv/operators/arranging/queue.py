@@ -32,6 +32,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
     )
 
     _timer: bpy.types.Timer | None = None
+    _jobs: queue.Queue | None = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -49,20 +50,28 @@ class UV_OT_omt_queue(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """For scripts and the redo panel: all at once."""
         state = self.begin(context)
-        while "RUNNING_MODAL" in state:
-            state = self._advance(context)
+        try:
+            while "RUNNING_MODAL" in state:
+                state = self._advance(context)
+        finally:
+            # Nothing would go on with it after an error.
+            if self._jobs is not None:
+                self._jobs.close()
         return state
 
     def begin(self, context: bpy.types.Context) -> set[str]:
         following.keep(context)
         try:
+            if queue.state is not None and queue.state.is_running:
+                raise Complaint(f"{self.bl_label} is still running. Wait, or stop it.")
             check_numbers(self)
             objects = mesh_objects(context)
             check_all_local([(obj, None) for obj in objects])
             _check_groups(context, objects)
         except Complaint as complaint:
             return tell(self, context, complaint)
-        queue.state = queue.Queue([queue.Job(obj.name) for obj in objects])
+        queue.forget()
+        queue.state = self._jobs = queue.Queue([queue.Job(obj.name) for obj in objects])
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -78,30 +87,44 @@ class UV_OT_omt_queue(bpy.types.Operator):
         """Work on the job that is on for a moment, or begin the next one."""
         from ...solver.progress import take_step
 
-        jobs = queue.state
+        jobs = self._jobs
         job = jobs.current if jobs is not None else None
-        if jobs is None or job is None or jobs.is_stopped:
+        if jobs is None or job is None or not jobs.is_running:
             return self._end(context)
         obj = bpy.data.objects.get(job.name)
         if obj is None or obj.name not in context.view_layer.objects:
             job.end("FAILED", "it is gone")
             return {"RUNNING_MODAL"}
         try:
-            steps = job.steps or job.begin(self._steps(context, obj))
-            end = time.monotonic() + run.SLICE
-            while time.monotonic() < end:
+            steps = job.steps or job.begin(self._steps(context, obj), run.Watch(context, [obj], any_mode=True))
+            job.check()
+            end, more = time.monotonic() + run.SLICE, True
+            while more:
                 job.progress = take_step(steps).fraction
                 if self.limit and job.seconds > self.limit:
                     job.end("FAILED", f"it took more than {self.limit:.0f} s")
                     return {"RUNNING_MODAL"}
+                more = time.monotonic() < end
         except StopIteration as stop:
-            job.warnings = _write(obj, stop.value)
-            job.end("DONE")
+            self._keep(job, obj, stop.value)
+        except run.Disturbed as reason:
+            job.end("FAILED", str(reason))
         except Complaint as complaint:
             # The job says whose it is.
             job.end("FAILED", str(complaint).removeprefix(f"{job.name}: "))
         last_run.redraw(context)
         return {"RUNNING_MODAL"}
+
+    @staticmethod
+    def _keep(job: queue.Job, obj: bpy.types.Object, layout) -> None:
+        """Write what was found for a job, if its object is still what it was found for."""
+        try:
+            job.check(thoroughly=True)
+        except run.Disturbed as reason:
+            job.end("FAILED", str(reason))
+            return
+        job.warnings = _write(obj, layout)
+        job.end("DONE")
 
     def _steps(self, context: bpy.types.Context, obj: bpy.types.Object):
         """The steps of unwrapping one object, with the settings of the operator."""
@@ -123,14 +146,13 @@ class UV_OT_omt_queue(bpy.types.Operator):
             return (yield from lay_out([job], UV_OT_omt_unwrap.settings(chosen)))
 
     def _end(self, context: bpy.types.Context) -> set[str]:
-        jobs = queue.state
+        jobs = self._jobs
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
-        if jobs is None:
+        if jobs is None or jobs.is_over:
             return {"CANCELLED"}
-        for job in jobs.jobs:
-            job.close()
+        jobs.close()
         failed = [job for job in jobs.jobs if job.state == "FAILED"]
         done = [job for job in jobs.jobs if job.state == "DONE"]
         for obj in context.view_layer.objects:
@@ -145,7 +167,6 @@ class UV_OT_omt_queue(bpy.types.Operator):
         last_run.keep(last_run.Summary(self.bl_label, rows, notices + told, names))
         for notice in notices:
             self.report({"WARNING"}, notice.text)
-        jobs.is_over = True
         last_run.redraw(context)
         one, many = "Unwrapped {} of {} object", "Unwrapped {} of {} objects"
         self.report({"INFO"}, counted(len(jobs.jobs), one, many, len(done), len(jobs.jobs)))

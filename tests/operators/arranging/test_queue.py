@@ -7,7 +7,15 @@ import types
 import bpy
 
 import numpy as np
+import pytest
 import scenes
+import windows
+
+
+@pytest.fixture(autouse=True)
+def no_queue(package):
+    yield
+    package("session.queue").forget()
 
 
 def event(kind, value="NOTHING"):
@@ -74,3 +82,108 @@ def test_what_may_not_be_written_is_told_before_it_is_unwrapped(package):
     assert jobs["Good"].state == "DONE" and "mine" in good.data.uv_layers
     assert jobs["Bad"].state == "FAILED" and "'mine' that is no UV layer" in jobs["Bad"].reason
     assert jobs["Bad"].progress == 0
+
+
+def _under_way(package, monkeypatch, names=("A", "B")):
+    """A queue whose first object is being unwrapped, and its objects."""
+    windows.in_single_steps(monkeypatch, package)
+    objects = [scenes.bump(12, 12, name=name, offset=2.0 * k) for k, name in enumerate(names)]
+    scenes.select(objects)
+    operator = scenes.stand_in("uv.omt_queue")
+    assert operator.begin(bpy.context) == {"RUNNING_MODAL"}
+    for _ in range(3):
+        assert operator._advance(bpy.context) == {"RUNNING_MODAL"}
+    jobs = package("session.queue").state.jobs
+    assert [job.state for job in jobs] == ["RUNNING", "WAITING"]
+    return operator, [bpy.data.objects[job.name] for job in jobs]
+
+
+def _watching():
+    """Handlers of those who watch what runs work on."""
+    return [f for f in bpy.app.handlers.depsgraph_update_post if type(getattr(f, "__self__", None)).__name__ == "Watch"]
+
+
+def _to_its_end(operator):
+    while operator._advance(bpy.context) == {"RUNNING_MODAL"}:
+        pass
+
+
+def _moved(obj):
+    obj.data.vertices[5].co.z += 0.5
+
+
+def _with_a_hole(obj):
+    mesh = bpy.data.meshes.new("Hole")
+    places = [v.co.copy() for v in obj.data.vertices]
+    mesh.from_pydata(places, [], [tuple(p.vertices) for p in obj.data.polygons][1:])
+    obj.data = mesh
+
+
+def _renamed(obj):
+    obj.name = "Other"
+
+
+def _with_a_seam(obj):
+    obj.data.edges[30].use_seam = True
+
+
+@pytest.mark.parametrize("change", [_moved, _with_a_hole, _with_a_seam])
+def test_what_was_changed_while_it_was_unwrapped_is_left_as_it_is(package, monkeypatch, change):
+    """UVs of a mesh that is no more would be wrong without a word, and the window lets everything be done meanwhile."""
+    operator, (first, second) = _under_way(package, monkeypatch)
+    change(first)
+    _to_its_end(operator)
+    jobs = package("session.queue").state.jobs
+    assert [job.state for job in jobs] == ["FAILED", "DONE"] and "changed meanwhile" in jobs[0].reason
+    assert not first.data.uv_layers and second.data.uv_layers
+    assert any(text.startswith(f"{first.name}: ") for kind, text in operator.reports if kind == {"WARNING"})
+
+
+def test_others_may_be_worked_on_meanwhile(package, monkeypatch):
+    operator, (first, second) = _under_way(package, monkeypatch)
+    third = scenes.bump(name="C", offset=9.0)
+    scenes.edit(third)
+    _to_its_end(operator)
+    assert [job.state for job in package("session.queue").state.jobs] == ["DONE", "DONE"]
+    assert first.data.uv_layers and second.data.uv_layers and not third.data.uv_layers
+
+
+def test_who_is_renamed_meanwhile_is_gone(package, monkeypatch):
+    operator, (first, second) = _under_way(package, monkeypatch)
+    _renamed(first)
+    _to_its_end(operator)
+    jobs = package("session.queue").state.jobs
+    assert [job.state for job in jobs] == ["FAILED", "DONE"] and not first.data.uv_layers
+
+
+def test_a_second_queue_waits_for_the_first_and_may_begin_when_that_was_stopped(package, monkeypatch):
+    operator, (first, second) = _under_way(package, monkeypatch)
+    queue = package("session.queue")
+    running, steps = queue.state, queue.state.jobs[0].steps
+    other = scenes.stand_in("uv.omt_queue")
+    assert other.begin(bpy.context) == {"CANCELLED"} and "still running" in other.reports[-1][1]
+    assert queue.state is running and not running.is_over
+    queue.stop()
+    assert other.begin(bpy.context) == {"RUNNING_MODAL"} and queue.state is not running
+    # Nothing of the first is left, and its operator ends without touching the second.
+    assert running.is_over and steps.gi_frame is None and not _watching()
+    assert operator._advance(bpy.context) == {"CANCELLED"}
+    _to_its_end(other)
+    assert [job.state for job in queue.state.jobs] == ["DONE", "DONE"] and not _watching()
+
+
+def test_nothing_is_left_of_a_queue_that_is_forgotten_on_its_way(package, monkeypatch):
+    _under_way(package, monkeypatch)
+    queue = package("session.queue")
+    steps = queue.state.jobs[0].steps
+    assert len(_watching()) == 1
+    queue.forget()
+    assert queue.state is None and steps.gi_frame is None and not _watching()
+
+
+def test_escape_in_the_window_keeps_what_is_done_and_closes_what_is_not(package, monkeypatch):
+    operator, (first, second) = _under_way(package, monkeypatch)
+    steps = package("session.queue").state.jobs[0].steps
+    assert operator.modal(bpy.context, event("ESC", "PRESS")) == {"PASS_THROUGH"}
+    assert operator.modal(bpy.context, event("TIMER")) == {"CANCELLED"}
+    assert steps.gi_frame is None and not first.data.uv_layers and not second.data.uv_layers

@@ -14,7 +14,7 @@ from omt_uv.pipelines.magnify import Region
 from omt_uv.pipelines.regions import detail
 from omt_uv.pipelines.shapes import distance, match, partition, strain
 from omt_uv.pipelines.shapes.cell_attributes import carry_to_cells
-from omt_uv.pipelines.shapes.landmark_pairs import pairs_of
+from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, Pairs, pairs_of
 from omt_uv.settings import PartitionSettings
 from omt_uv.solver.mesh.geometry import face_areas, face_normals
 from omt_uv.solver.mesh.surface import chosen_triangles, triangle_surface
@@ -214,6 +214,51 @@ def test_small_parts_go_along_with_a_similarity(mirrored):
         for rows in (np.isin(F, part.rest).all(axis=1),):
             before, after = (np.linalg.det(x[F[rows]] - x[F[rows]].mean(axis=(0, 1))) for x in (V, wrapped))
             assert np.isfinite(after).all() and before.any()
+
+
+def test_landmarks_have_the_numbers_of_the_part_the_first_vertex_too():
+    """And what is on another part a number that no vertex of this one has; places without a vertex stay so."""
+    V, F = two_parts()
+    surface = triangle_surface(V, F)
+    part = match.largest_part(surface, "source")
+    given = [*range(len(V)), -1]
+    points = tuple(LandmarkPoint(f"{k}", k, None if k >= 0 else (0.0, 0.0, 1.0)) for k in given)
+    renamed = match._renamed(Pairs(points, points), part, part)
+    place = {k: i for i, k in enumerate(part.used.tolist())}
+    expected = [-1 if k < 0 else place.get(k, len(part.used)) for k in given]
+    for side in (renamed.source, renamed.target):
+        assert [point.vertex for point in side] == expected
+        assert [(p.name, p.position) for p in side] == [(p.name, p.position) for p in points]
+
+
+def horn(before, after):
+    """The similarity that fits best, by the largest eigenvector of a matrix of four rows (Horn 1987)."""
+    p, q = before - before.mean(axis=0), after - after.mean(axis=0)
+    S = p.T @ q
+    d = np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
+    N = np.block([[np.trace(S), d], [d[:, None], S + S.T - np.trace(S) * np.eye(3)]])
+    w, x, y, z = np.linalg.eigh(N)[1][:, -1]
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    R = np.eye(3) + 2 * w * K + 2 * K @ K
+    scale = np.sum(q * (p @ R.T)) / np.sum(p**2)
+    return lambda x: scale * (x - before.mean(axis=0)) @ R.T + after.mean(axis=0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_small_part_goes_by_the_best_similarity_of_all_that_is_near(seed, mirrored):
+    """The large part has so few vertices that all are near; what is mirrored is followed by a turn, and smaller."""
+    rng = np.random.default_rng(seed)
+    (V, F), (W, G) = meshes.icosphere(1), meshes.icosphere(0)
+    W = 0.2 * W + [1.5, 0.1, 0]
+    surface = triangle_surface(np.concatenate([V, W]), np.concatenate([F, G + len(V)]))
+    part = match.largest_part(surface, "source")
+    wrapped = surface.positions.copy()
+    moved = V * [1.0, 1.3, 0.6] @ (1.4 * random_rotation(seed)).T + rng.normal(scale=0.05, size=V.shape)
+    wrapped[: len(V)] = moved * ([1, 1, -1] if mirrored else 1)
+    goal = horn(V, wrapped[: len(V)])
+    match._carry_parts(wrapped, surface, part)
+    np.testing.assert_allclose(wrapped[len(V) :], goal(W), atol=1e-9)
 
 
 SIDES = ("source", "target")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.symmetry_plane import NEAR, SAMPLES, _cells, symmetry_plane
+from omt_uv.solver.analysis.symmetry_plane import NEAR, SAMPLES, MirrorImages, _cells, symmetry_plane
 
 TURNS = [np.eye(3), *Rotation.random(1, random_state=1).as_matrix()]
 
@@ -145,3 +145,9 @@ def test_of_planes_that_are_as_good_that_across_the_side_is_taken_however_the_bo
     turn = Rotation.random(1, random_state=seed).as_matrix()[0]
     plane = symmetry_plane(body @ turn.T, F, side=turn[:, side])
     assert not plane.is_exact and degrees_between(plane.normal, turn[:, side]) < 2
+
+
+def test_what_has_no_image_is_nobody_s_and_not_in_the_plane():
+    images = MirrorImages.of(np.array([1, 0, 2, -1, -1]))
+    assert images.exact.tolist() == [1, 0, 2, -1, -1] and images.nearest.tolist() == [1, 0, 2, 3, 4]
+    assert images.in_plane.tolist() == [False, False, True, False, False] and images.are_exact

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from omt_uv.solver.maps import embedding
 from omt_uv.solver.maps.embedding import check_layout
 from omt_uv.solver.maps.overlap import overlap_share
 
@@ -111,3 +112,19 @@ def test_uvs_that_are_no_numbers_are_folds(value):
     uv = P[F]
     uv[[3, 7], 1] = value
     assert np.flatnonzero(check_layout(F, uv).folded).tolist() == [3, 7]
+
+
+@pytest.mark.parametrize("far", [2**8, 2**16, 2**20, 9_000_000])
+def test_corners_of_one_vertex_are_one_where_their_uvs_are_and_nowhere_else(far):
+    """Also where what is to the right of one by a little lies below it by a lot, as one number of both may weld."""
+    steps = np.array([[0, far], [1, 0], [0, 0], [2, 0], [1, far], [0, 10**7], [10**7, 0]]) * embedding.WELD
+    rng = np.random.default_rng(far)
+    F = rng.integers(0, 5, (60, 3))
+    uv = steps[rng.integers(0, len(steps), (60, 3))]
+    uv[0], uv[1] = steps[[5, 6, 2]], steps[[0, 1, 2]]
+    F[1] = 0
+    found = embedding._uv_vertices(F, uv).ravel()
+    place = np.round(uv.reshape(-1, 2) / embedding.WELD).astype(int)
+    expected = np.unique(np.column_stack([F.ravel(), place]), axis=0, return_inverse=True)[1].ravel()
+    assert len(np.unique(found)) == expected.max() + 1
+    assert len(np.unique(np.column_stack([found, expected]), axis=0)) == expected.max() + 1
