@@ -1,12 +1,20 @@
 """Bodies of many handles taken apart."""
 
+from types import SimpleNamespace
+
+import bodies
 import meshes
 import numpy as np
+import pytest
 from short_cuts import gluing_of
+from thin_walls import thickened
 
 from omt_uv.solver.cutting.component import classify
-from omt_uv.solver.cutting.handle_partition import FEW, MANY_HANDLES, cluster_borders, partition_pairs
+from omt_uv.solver.cutting.gluing_facts import in_unit_box
+from omt_uv.solver.cutting.handle_partition import FEW, MANY_HANDLES, cluster_borders, partition_pairs, wall_pairs
 from omt_uv.solver.mesh.gluing import components, corner_classes
+from omt_uv.solver.mesh.repair import repaired_gluing
+from omt_uv.solver.mesh.surface import chosen_triangles, triangle_surface
 
 
 def voxel_surface(solid):
@@ -67,3 +75,34 @@ def test_clusters_have_few_handles_and_nothing_else_is_touched():
     # Where borders are cut they part clusters: each pair has two different ones beside it.
     component = components(left)
     assert (component[gluing.first[gone] // 3] != component[gluing.second[gone] // 3]).all()
+
+
+def cloth(count):
+    """A square in three waves."""
+    V, F = meshes.grid(count, count, 2.0, 2.0)
+    return np.column_stack([V[:, :2], 0.2 * np.sin(9 * V[:, 0])]), F
+
+
+@pytest.mark.parametrize(
+    ("body", "parts"),
+    [
+        (thickened(*meshes.hemisphere(12, 32), 0.05), 2),
+        (thickened(*cloth(40), 0.02), 2),
+        (thickened(*meshes.grid(12, 12), 0.08), 1),
+        (meshes.cube(), 1),
+        (bodies.icosphere(2), 1),
+    ],
+    ids=["cap", "cloth", "board", "cube", "ball"],
+)
+def test_thin_walls_come_apart_and_of_hard_ones_cloth_alone(body, parts):
+    surface = triangle_surface(*body)
+    gluing = repaired_gluing(surface, *chosen_triangles(surface, None)).gluing
+    positions, gone = in_unit_box(surface, gluing)[0], np.zeros(len(gluing.first), bool)
+    for wanted in (True, False):
+        search = SimpleNamespace(wants=lambda *_, wanted=wanted: wanted)
+        found = wall_pairs(surface, gluing, positions, gone, search)
+        assert components(gluing.without(found)).max() + 1 == (parts if wanted else 1)
+        assert found.any() == (wanted and parts > 1)
+    # What has come apart already does not do so again.
+    apart = wall_pairs(surface, gluing, positions, gone, SimpleNamespace(wants=lambda *_: True))
+    assert not wall_pairs(surface, gluing, positions, apart, SimpleNamespace(wants=lambda *_: True)).any()
