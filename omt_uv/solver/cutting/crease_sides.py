@@ -431,7 +431,7 @@ def _laid_out(component: CutComponent, border: np.ndarray, rows: np.ndarray) -> 
     corners = cut_classes(component, border)[rows]
     _, first, triangles = np.unique(corners, return_index=True, return_inverse=True)
     positions, triangles = component.positions[component.triangles[rows].ravel()[first]], triangles.reshape(-1, 3)
-    flat, gap = developed(positions, triangles)
+    flat, gap = developed(positions, triangles, across_long=True)
     return flat, triangles, float(gap.max())
 
 

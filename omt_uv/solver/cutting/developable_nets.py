@@ -157,7 +157,7 @@ def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
     corners = cut_classes(component, cut)
     positions = np.zeros((int(corners.max()) + 1, 3))
     positions[corners.ravel()] = component.positions[component.triangles.ravel()]
-    flat, gap = developed(positions, corners)
+    flat, gap = developed(positions, corners, across_long=True)
     # What is not quite flat is laid somewhere else by its map.
     if gap.max() > FLAT * np.abs(flat).max() or lies_apart(flat, corners):
         return False

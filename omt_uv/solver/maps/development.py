@@ -2,8 +2,8 @@
 
 Every triangle is placed beside its parent in a tree of neighbours; the motions along the tree are composed by pointer
 doubling. Where a surface has no curvature that is exact to rounding, while the condition of a system of equations
-grows with the fourth power of the length of a strip. The tree crosses the longest edges there are: where the small
-patches at the corners of bevels are curved, what they disagree by is theirs alone.
+grows with the fourth power of the length of a strip. The tree is as shallow as can be, or crosses the longest edges
+there are: where the small patches at the corners of bevels are curved, what they disagree by is theirs alone then.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ FLAT = 1e-4
 SHORT = 1e-9
 
 
-def developed(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def developed(positions: np.ndarray, triangles: np.ndarray, across_long: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Places (n,) complex of the vertices of flat components (n,3), (m,3), and how far their triangles disagree, (n,).
 
     Edges keep their lengths where triangles agree. Each component has a place of its own.
+    across_long : the tree crosses the longest edges
     """
     local = _local_frames(positions, triangles)
-    turn, shift = _composed(*_motions(local, triangles))
+    turn, shift = _composed(*_motions(local, triangles, across_long))
     corners = (turn[:, None] * local + shift[:, None]).ravel()
     flat, n = triangles.ravel(), len(positions)
     count = np.maximum(np.bincount(flat, minlength=n), 1)
@@ -55,19 +56,22 @@ def _local_frames(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.stack([np.zeros(len(base), complex), base.astype(complex), along + 1j * height], axis=1)
 
 
-def _motions(local: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _motions(local: np.ndarray, triangles: np.ndarray, across_long: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Parents (m,) in a forest of neighbours, a root its own, and the turn and shift (m,) complex into their frames."""
     m = len(triangles)
     twin = twins(triangles)
     inner = np.flatnonzero(twin >= 0)
     _, component = graph_components(inner // 3, twin[inner] // 3, m)
     roots = np.unique(component, return_index=True)[1]
-    length = np.abs(np.roll(local, -1, axis=1) - local).ravel()[inner]
-    price = length.max(initial=0.0) / np.maximum(length, SHORT * length.max(initial=0.0) + 1e-300)
-    forest = minimum_spanning_tree(coo_matrix((price, (inner // 3, twin[inner] // 3)), shape=(m, m)).tocsr()).tocoo()
+    one, other = inner // 3, twin[inner] // 3
+    if across_long:
+        length = np.nan_to_num(np.abs(np.roll(local, -1, axis=1) - local).ravel()[inner], nan=0.0, posinf=0.0)
+        price = 1 / np.maximum(length / np.maximum(length.max(initial=0.0), 1e-300), SHORT)
+        forest = minimum_spanning_tree(coo_matrix((price, (one, other)), shape=(m, m)).tocsr()).tocoo()
+        one, other = forest.row, forest.col
     # One more node, beside all roots, makes the forest a tree.
-    rows = np.concatenate([forest.row, np.full(len(roots), m), roots])
-    columns = np.concatenate([forest.col, roots, np.full(len(roots), m)])
+    rows = np.concatenate([one, np.full(len(roots), m), roots])
+    columns = np.concatenate([other, roots, np.full(len(roots), m)])
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(m + 1, m + 1)).tocsr()
     parent = breadth_first_order(graph, m, directed=False)[1][:m].astype(np.int64)
     parent[roots] = roots
