@@ -98,11 +98,11 @@ def test_thin_walls_come_apart_and_of_hard_ones_cloth_alone(body, parts):
     surface = triangle_surface(*body)
     gluing = repaired_gluing(surface, *chosen_triangles(surface, None)).gluing
     positions, gone = in_unit_box(surface, gluing)[0], np.zeros(len(gluing.first), bool)
-    for wanted in (True, False):
-        search = SimpleNamespace(wants=lambda *_, wanted=wanted: wanted)
+    for asked in (True, False):
+        search = SimpleNamespace(wants=lambda *_, asked=asked: asked)
         found = wall_pairs(surface, gluing, positions, gone, search)
-        assert components(gluing.without(found)).max() + 1 == (parts if wanted else 1)
-        assert found.any() == (wanted and parts > 1)
+        assert components(gluing.without(found)).max() + 1 == (parts if asked else 1)
+        assert found.any() == (asked and parts > 1)
     # What has come apart already does not do so again.
     apart = wall_pairs(surface, gluing, positions, gone, SimpleNamespace(wants=lambda *_: True))
     assert not wall_pairs(surface, gluing, positions, apart, SimpleNamespace(wants=lambda *_: True)).any()
