@@ -29,8 +29,6 @@ CLUSTERS = 4
 # Clusters with more handles than this fall apart again, so often at most.
 FEW = 1
 ROUNDS = 12
-# Both sides of cloth have so much of its area, without a crease.
-CLOTH = 0.9
 # A step over an edge at a right angle counts so many times.
 CREASE = 4.0
 
@@ -54,18 +52,14 @@ def wall_pairs(
     surface: Surface, gluing: Gluing, positions: np.ndarray, gone: np.ndarray, search: SideFinder
 ) -> np.ndarray:
     """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which thin walls that are searched come
-    apart into their two sides: a cup, a shirt. What has a hard surface only does where it is as thin as cloth: the
-    sides of a board are flaps of one net.
+    apart into their two sides: a cup, a shirt. What has a hard surface, as a board, comes apart along its creases.
 
     positions (n,3) in a unit box
     """
     found = np.zeros(len(gone), dtype=bool)
     for part, number, creased in seen_parts(surface, gluing, positions, gone, search):
-        given = part.positions, part.triangles, part.pair, part.length, ~np.isfinite(part.cost)
-        wall = wall_edges(*given)
-        if wall is not None and creased and hard_sides(part) is not None:
-            wall = wall_edges(*given, mostly=CLOTH)
-        if wall is not None:
+        wall = wall_edges(part.positions, part.triangles, part.pair, part.length, ~np.isfinite(part.cost))
+        if wall is not None and not (creased and hard_sides(part) is not None):
             found[number[wall]] = True
     return found
 

@@ -13,7 +13,7 @@ from ..mesh.geometry import dot3
 from ..mesh.topology import graph_components
 from .opposite import Faces
 
-# A wall has so much of its area opposite to one another, if no more is asked, in two parts of that share at least.
+# A wall has so much of its area opposite to one another, in two parts of that share of it at least.
 MOSTLY = 0.8
 PART = 0.2
 # A side goes on across a fold whose normals have more than that cosine.
@@ -27,18 +27,12 @@ WITHIN = 1e3
 
 
 def wall_edges(
-    positions: np.ndarray,
-    triangles: np.ndarray,
-    pair: np.ndarray,
-    length: np.ndarray,
-    within: np.ndarray,
-    mostly: float = MOSTLY,
+    positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray, length: np.ndarray, within: np.ndarray
 ) -> np.ndarray | None:
     """Edges (e,) bool along which a body (n,3), (m,3) that is a thin wall comes apart into its two sides, beside its
     border or across it where that is shorter; None of any other body.
 
-    pair (e,2) : both halfedges of its inner edges, their lengths (e,), and which lie within polygons (e,) bool;
-        mostly : the share of its area that its two sides have, without the border
+    pair (e,2) : both halfedges of its inner edges, their lengths (e,), and which lie within polygons (e,) bool
 
     >>> import numpy as np
     >>> V = np.array([[x, y, z] for z in (0.0, 0.1) for y in (0.0, 1.0) for x in (0.0, 1.0)])
@@ -60,7 +54,7 @@ def wall_edges(
     part = graph_components(both[:, 0], both[:, 1], len(triangles))[1]
     share = np.bincount(part, faces.area * is_opposite) / total
     sides = np.flatnonzero(share >= PART)
-    if len(sides) != 2 or share[sides].sum() < mostly:
+    if len(sides) != 2 or share[sides].sum() < MOSTLY:
         return None
     one, other = (np.flatnonzero(is_opposite & (part == k)) for k in sides[np.argsort(share[sides], kind="stable")])
     price = np.where(within, WITHIN * length.max(), length)

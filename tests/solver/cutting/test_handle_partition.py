@@ -87,14 +87,14 @@ def cloth(count):
     ("body", "parts"),
     [
         (thickened(*meshes.hemisphere(12, 32), 0.05), 2),
-        (thickened(*cloth(40), 0.02), 2),
+        (thickened(*cloth(40), 0.02), 1),
         (thickened(*meshes.grid(12, 12), 0.08), 1),
         (meshes.cube(), 1),
         (bodies.icosphere(2), 1),
     ],
     ids=["cap", "cloth", "board", "cube", "ball"],
 )
-def test_thin_walls_come_apart_and_of_hard_ones_cloth_alone(body, parts):
+def test_thin_walls_come_apart_but_for_hard_ones(body, parts):
     surface = triangle_surface(*body)
     gluing = repaired_gluing(surface, *chosen_triangles(surface, None)).gluing
     positions, gone = in_unit_box(surface, gluing)[0], np.zeros(len(gluing.first), bool)

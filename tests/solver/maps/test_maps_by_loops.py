@@ -303,7 +303,8 @@ def test_turns_from_one_direction_to_another_are_counted_to_a_whole_one():
     np.testing.assert_allclose(contacts._turn(to, along), [2 * np.pi, 2 * np.pi, 0.002, np.pi, 2 * np.pi - 0.1])
 
 
-def test_triangles_are_developed_from_their_parents_frames():
+@pytest.mark.parametrize("across_long", [False, True])
+def test_triangles_are_developed_from_their_parents_frames(across_long):
     V, F = meshes.bumpy(5, 4)
     local = development._local_frames(V, F)
     for t, face in enumerate(F):
@@ -312,7 +313,7 @@ def test_triangles_are_developed_from_their_parents_frames():
             [np.linalg.norm(V[face[(k + 1) % 3]] - V[face[k]]) for k in range(3)],
         )
         assert local[t, 0] == 0 and local[t, 1].imag == 0 and local[t, 2].imag > 0
-    parent, turn, shift = development._motions(local, F)
+    parent, turn, shift = development._motions(local, F, across_long)
     roots = np.flatnonzero(parent == np.arange(len(F)))
     assert roots.tolist() == [0] and turn[0] == 1 and shift[0] == 0
     np.testing.assert_allclose(np.abs(turn), 1)
