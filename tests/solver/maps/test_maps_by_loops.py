@@ -329,7 +329,7 @@ def test_triangles_are_developed_from_their_parents_frames(across_long):
         while parent[at] != at:
             z, at = turn[at] * z + shift[at], parent[at]
         np.testing.assert_allclose(whole[t] * local[t] + offset[t], z, atol=1e-12)
-    w, gap = development.developed(V, F)
+    w, gap = development.developed(V, F, across_long)
     corners = whole[:, None] * local + offset[:, None]
     for v in range(len(V)):
         mine = corners[v == F]
