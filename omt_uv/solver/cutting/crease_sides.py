@@ -29,8 +29,9 @@ from .gluing_facts import cost_factors, diagonal_pairs, seen_parts
 ROUND = 1.0
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
 # whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of so many sides
-# that nearly all unroll, or half where nearly all borders are hard: low ones of animals are folded everywhere, into
-# small sides and bluntly. Of so few sides, as bodies of few polygons have, half of the borders do.
+# that nearly all unroll, or most, or half of it is large, where nearly all borders are hard: low ones of animals are
+# folded everywhere, into small sides and bluntly. Of so few sides, as bodies of few polygons have, half of the borders
+# do.
 LARGE = 0.03
 MOSTLY = 0.7
 HALF = 0.5
@@ -121,8 +122,9 @@ def _borders(
     creases, if it is creased, count as they are."""
     # Bodies whose edges are all rounded have sides, too; a disk with such an outline lies flat as it is.
     sides = hard_sides(component, diagonals is None) if creased or not component.is_disk else None
-    if sides is not None and diagonals is not None:
-        # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these.
+    if sides is not None and diagonals is not None and _creased(component)[-1] < ALL:
+        # Diagonals of what was triangulated are creases, too, and bodies that swell seem flat between these: not such
+        # as have hard edges alone.
         diagonal = diagonals()[component.gluing_pair]
         if diagonal.any():
             component = with_quads(component, diagonal)
@@ -185,28 +187,19 @@ def _has_clear_net(component: CutComponent) -> bool:
 def hard_sides(component: CutComponent, may_swell: bool = False) -> tuple[np.ndarray, np.ndarray] | None:
     """The side (m,) of every triangle of a component of a hard surface, and which sides (s,) bool unroll; None of any
     other, and of one that swells unless it may."""
-    fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
-    joined, count, length = component.pair // 3, len(component.triangles), component.length
-    tight = tight_edges(component, fold)
-    hard = ((fold > SMOOTH) | tight) & np.isfinite(component.cost)
-    side = graph_components(joined[~hard, 0], joined[~hard, 1], count)[1]
-    border = side[joined[:, 0]] != side[joined[:, 1]]
+    joined, length = component.pair // 3, component.length
+    side, border, fold, area, large, keen = _creased(component)
     if not border.any():
         return None
-    area = np.bincount(side, face_areas(component.positions, component.triangles))
     curvature = np.abs(defects(component))
     bent = _inner_curvature(component, side, border, curvature, len(area))
     unrolls = bent <= ROUND
-    large = area >= LARGE * area.sum()
-    # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
-    sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
-    mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
     # Of noise every triangle is a side.
-    few = len(area) <= MOST_SIDES
+    mostly, few = area[unrolls & large].sum() / area.sum(), len(area) <= MOST_SIDES
     if not may_swell and len(area) > SIMPLE and _swells(component, side, border, fold, area, bent):
         return None
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
-    unrolled = area[unrolls].sum() >= ALL * area.sum()
+    unrolled = area[unrolls].sum() >= (SHARP if keen >= ALL else ALL) * area.sum()
     if not sure and not (few and unrolled):
         return None
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
@@ -221,6 +214,21 @@ def hard_sides(component: CutComponent, may_swell: bool = False) -> tuple[np.nda
         return None
     flat = _inner_curvature(component, whole, border, curvature, len(inside)) <= ROUND
     return whole, np.where(inside, np.bincount(whole, (unrolls & large)[side]) > 0, flat)
+
+
+def _creased(component: CutComponent) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """What lies between creases: the side (m,) of every triangle, the edges (e,) bool between sides, folds (e,), areas
+    (s,), which sides (s,) bool are large, and along which share of their borders they meet in hard edges."""
+    fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
+    joined, length, tight = component.pair // 3, component.length, tight_edges(component, fold)
+    hard = ((fold > SMOOTH) | tight) & np.isfinite(component.cost)
+    side = graph_components(joined[~hard, 0], joined[~hard, 1], len(component.triangles))[1]
+    border = side[joined[:, 0]] != side[joined[:, 1]]
+    area = np.bincount(side, face_areas(component.positions, component.triangles))
+    large = area >= LARGE * area.sum()
+    # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
+    sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
+    return side, border, fold, area, large, float(length[sharp].sum() / max(length[border].sum(), 1e-300))
 
 
 def _swells(component: CutComponent, side, border, fold, area, bent) -> bool:

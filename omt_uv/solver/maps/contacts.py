@@ -130,7 +130,7 @@ def covering_contacts(
     if not on.any():
         return found
     i, j, at_tail = i[on], j[on], at_tail[on]
-    before = _before(tail, head)
+    before = edges_before(tail, head)
     begin, other = np.angle(along[i]), np.angle(along[j])
     angle = _turn(-along[before[i]], along[i])
     opposite = np.where(at_tail, _turn(-along[before[j]], along[j]), np.pi)
@@ -155,12 +155,12 @@ def turns(w: np.ndarray, tail: np.ndarray, head: np.ndarray, owner: np.ndarray |
     tail, head : (b,) of the edges; owner (b,) : the outline from 0 to c - 1 that each belongs to, one by default
     """
     along = w[head] - w[tail]
-    before = along[_before(tail, head)]
+    before = along[edges_before(tail, head)]
     owner = np.zeros(len(tail), np.int64) if owner is None else owner
     return np.rint(np.bincount(owner, np.pi - _turn(-before, along)) / (2 * np.pi)).astype(np.int64)
 
 
-def _before(tail: np.ndarray, head: np.ndarray) -> np.ndarray:
+def edges_before(tail: np.ndarray, head: np.ndarray) -> np.ndarray:
     """The edge (b,) that ends where each begins."""
     before = np.empty(len(tail), np.int64)
     before[np.argsort(tail)] = np.argsort(head)

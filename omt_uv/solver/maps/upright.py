@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.charts import Chart
-from ..mesh.geometry import cross3, part_by_part, signed_areas
+from ..mesh.geometry import cross3, dot3, part_by_part, signed_areas, unit
 from ..mesh.topology import halfedges, pair_keys, pair_up
 
 # Directions of edges, up to quarter turns, are counted in so many bins of half a degree.
@@ -25,6 +25,9 @@ DOMINANT = 0.3
 # Share of the outline along one direction from which on the outline alone decides: squares, nets. With less it does
 # where it is clearer than all sides are, among which are the diagonals of what came in triangles.
 STRAIGHT = 0.5
+# Edges that fold by more, in radians, are creases; these and the outline have a direction with this share along it.
+CREASE = np.radians(10)
+CREASED = 0.25
 # Heights have a direction in the map where their gradients add up to this share of what they would in parallel, ...
 PARALLEL = 0.1
 # ... and are this steep in the mean, next to an upright wall.
@@ -111,7 +114,8 @@ def _together(charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> _Islands:
 def _edge_directions(islands: _Islands) -> tuple[np.ndarray, np.ndarray]:
     """Share (k,) of the length of sides along one direction up to quarter turns, and that direction (k,).
 
-    Sides are those of the outline where it is straight enough or straighter, else those of all polygons.
+    Sides are those of the outline where it is straight enough or straighter, else those of all polygons; where neither
+    have a direction those of the outline and creases: long polygons of machined parts came in triangles of any shape.
     """
     tail, head = halfedges(islands.triangles)
     face = np.repeat(islands.polygons, 3)
@@ -120,9 +124,21 @@ def _edge_directions(islands: _Islands) -> tuple[np.ndarray, np.ndarray]:
     outline[first] = outline[second] = False
     side = outline.copy()
     side[first] = face[first] != face[second]
-    (share, direction), (straight, along) = (_main_direction(islands, tail, head, x) for x in (side, outline))
+    creased = outline.copy()
+    creased[first] = _fold(islands, first // 3, second // 3) > CREASE
+    found = [_main_direction(islands, tail, head, x) for x in (side, outline, creased)]
+    (share, direction), (straight, along), (folded, crease) = found
     own = straight >= np.minimum(np.maximum(share, DOMINANT), STRAIGHT)
-    return np.where(own, straight, share), np.where(own, along, direction)
+    share, direction = np.where(own, straight, share), np.where(own, along, direction)
+    bent = (share < DOMINANT) & (folded >= CREASED)
+    return np.where(bent, DOMINANT, share), np.where(bent, crease, direction)
+
+
+def _fold(islands: _Islands, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Angle (e,) in space between triangles one and other (e,)."""
+    a, b, c = np.moveaxis(islands.points[islands.triangles], 1, 0)
+    normal = unit(cross3(b - a, c - a))
+    return np.arccos(np.clip(dot3(normal[one], normal[other]), -1, 1))
 
 
 def _main_direction(islands: _Islands, tail, head, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

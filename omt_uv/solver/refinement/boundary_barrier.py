@@ -14,13 +14,18 @@ from typing import Any
 import numpy as np
 
 from ..maps.boxes import box_pairs
-from ..maps.contacts import box_of, loop_edges
+from ..maps.contacts import box_of, edges_before, loop_edges
 from ..mesh.geometry import complex_cross
 
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
 REACH = 0.5
 # A step goes at most this share of the way to the first contact.
 CONTACT_SHARE = 0.8
+# What is nearer than this share of the reach is set apart by as much before a barrier stands between: nets lie edge to
+# edge, where it is infinite, and what has no way to go is not held back either. Its reach is less there, lest slits
+# through flat sides open.
+APART = 0.1
+CLOSE_REACH = 0.05
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,24 @@ class BoundaryBarrier:
         i, j = i[apart], j[apart]
         times = _contact_times(p[i] - a[j], dp[i] - da[j], b[j] - a[j], db[j] - da[j])
         return CONTACT_SHARE * float(times.min(initial=np.inf))
+
+    def set_apart(self, w: np.ndarray) -> np.ndarray:
+        """A step (n,) that draws what nearly touches into the map w (n,), along the bisectors of its corners."""
+        near, step = self._near_in(w), np.zeros(len(w), complex)
+        close = near.distance < APART * near.reach
+        if not close.any():
+            return step
+        along = w[self.head] - w[self.tail]
+        along /= np.maximum(np.abs(along), 1e-300)
+        inward = 1j * (along + along[edges_before(self.tail, self.head)])
+        size = np.abs(inward)
+        # The tip of a slit has no such direction, and need not move.
+        turns = size > APART
+        step[self.tail[turns]] = APART * self.vertex_reach[turns] * inward[turns] / size[turns]
+        touching = np.zeros(len(w), bool)
+        for vertices in (near.point, near.tail, near.head):
+            touching[vertices[close]] = True
+        return np.where(touching, step, 0)
 
     def _near(self, w: np.ndarray) -> _Near:
         if self._found.get("map") is not w:
@@ -130,15 +153,14 @@ class _Near:
         return np.sqrt(size * rate) * (slide / size + turn / rate)
 
 
-def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float) -> BoundaryBarrier:
-    """A barrier for a boundary, see `loop_edges`, whose reach follows the edge lengths of the map w (n,)."""
+def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float, reach: float = REACH) -> BoundaryBarrier:
+    """A barrier for a boundary, see `loop_edges`, whose reach is that share of the edge lengths of the map w (n,)."""
     tail, head = loop_edges(loop)
     edge = np.abs(w[head] - w[tail])
     edge = np.minimum(edge, edge.mean())
-    before = np.empty_like(edge)
-    before[np.argsort(tail)] = edge[np.argsort(head)]
+    before = edge[edges_before(tail, head)]
     return BoundaryBarrier(
-        tail=tail, head=head, vertex_reach=REACH * np.minimum(edge, before), edge_reach=REACH * edge, strength=strength
+        tail=tail, head=head, vertex_reach=reach * np.minimum(edge, before), edge_reach=reach * edge, strength=strength
     )
 
 

@@ -18,7 +18,7 @@ from ..maps.energy import Elements, missing_tilt, target_error, target_error_but
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import energy_in_turn, with_convex_quads
 from ..progress import Progress, Steps
-from .boundary_barrier import BoundaryBarrier, make_barrier
+from .boundary_barrier import CLOSE_REACH, REACH, BoundaryBarrier, make_barrier
 from .continuation_rules import (
     FIRST_PRESSURE,
     FORESEEN,
@@ -71,6 +71,7 @@ class MapProblem:
     loose : stages end on a looser promise, see `continuation_rules.stage_tolerances`
     symmetry : of the maps, or None
     count : of the polygons, where `faces` are those of one half, see `mirrored_motion.halved`
+    reach : of the barrier, see `boundary_barrier.make_barrier`
     """
 
     faces: Elements
@@ -83,6 +84,7 @@ class MapProblem:
     symmetry: MirrorSymmetry | None = None
     count: int | None = None
     loose: bool = False
+    reach: float = REACH
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.
@@ -107,7 +109,7 @@ class MapProblem:
         if self.loop is None:
             raise ValueError("a boundary that may not move has nothing to be kept from")
         count = len(self.faces.area) if self.count is None else self.count
-        return make_barrier(w, self.loop, CONTACT_STRENGTH / count)
+        return make_barrier(w, self.loop, CONTACT_STRENGTH / count, self.reach)
 
     def boundary_crosses(self, w: np.ndarray) -> bool:
         """Whether the boundary of the map w (n,) crosses itself; never without a loop."""
@@ -182,7 +184,7 @@ def minimise_in_stages(
         stage = yield from minimise(newton, w, limits, k, forbidden)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
-            w, with_barrier = as_far_as_apart(problem, newton, stage), True
+            (problem, w), with_barrier = set_apart(problem, newton, stage), True
             continue
         k += 1
         error, rest = target_error(problem.faces, w), target_error_but_share(problem.faces, w)
@@ -220,6 +222,18 @@ def as_far_as_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResu
     near = stage.w + problem.barrier(stage.w).limit(stage.w, step) * step
     lower = np.isfinite(near).all() and newton.energy(near) < stage.energy
     return near if lower and not problem.boundary_crosses(near) else stage.w
+
+
+def set_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResult) -> tuple[MapProblem, np.ndarray]:
+    """The problem for what goes on with a barrier after a stage that ended "crossed", and the map (n,) complex to go on
+    from: `as_far_as_apart`, or where the boundary touches itself, as that of a net does, the map with these a little
+    apart, and a barrier that reaches no farther than it has to."""
+    step, motion = problem.barrier(stage.w).set_apart(stage.w), problem.motion
+    if step.any():
+        moved = motion.move(stage.w, np.where(motion.free.all(axis=1), step / motion.frame(stage.w), 0))
+        if np.isfinite(newton.energy(moved)) and not problem.boundary_crosses(moved):
+            return replace(problem, reach=CLOSE_REACH), moved
+    return problem, as_far_as_apart(problem, newton, stage)
 
 
 def _first_weights(
