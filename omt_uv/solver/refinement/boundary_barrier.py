@@ -92,8 +92,8 @@ class BoundaryBarrier:
         turns = size > APART
         step[self.tail[turns]] = APART * self.vertex_reach[turns] * inward[turns] / size[turns]
         touching = np.zeros(len(w), bool)
-        for vertices in (near.point, near.tail, near.head):
-            touching[vertices[close]] = True
+        for vertices, at in ((near.point, close), (near.tail, near.share < 1), (near.head, near.share > 0)):
+            touching[vertices[close & at]] = True
         return np.where(touching, step, 0)
 
     def _near(self, w: np.ndarray) -> _Near:

@@ -549,6 +549,21 @@ def test_a_hard_body_that_was_triangulated_comes_apart_as_it_does_of_quads(turne
     assert apart and borders_of(triangle_surface(V, triangles_of(np.roll(Q, 1, axis=1) if turned else Q))) == apart
 
 
+@pytest.mark.parametrize("hard", [True, False])
+def test_between_hard_edges_alone_nothing_is_taken_for_a_diagonal(hard, monkeypatch):
+    """A machined part has pairs of triangles that could have been quads across its edges, and is no less hard."""
+    V, Q = washer()
+    surface, asked = triangle_surface(V, triangles_of(Q)), []
+    monkeypatch.setattr(
+        crease_sides, "diagonal_pairs", lambda left, *_: asked.append(1) or np.ones(len(left.first), bool)
+    )
+    monkeypatch.setattr(crease_sides, "with_quads", lambda component, diagonal: component)
+    if not hard:
+        monkeypatch.setattr(crease_sides, "HARD", np.radians(100))
+        monkeypatch.setattr(crease_sides, "SHARP", 0.0)
+    assert borders_of(surface) and len(asked) == (not hard)
+
+
 @pytest.mark.parametrize("unrolls", [(True, True, False), (True, False, True), (True, False, False)])
 def test_what_has_joined_a_side_that_lies_apart_lies_apart_itself(unrolls, monkeypatch):
     """Two small sides lie flat beside each other, but not beside the large one, from which they keep their border; only

@@ -3,9 +3,11 @@
 import meshes
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from omt_uv.solver.maps.upright import turn_upright
 from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 
 UP = (0.0, 0.0, 1.0)
@@ -150,3 +152,26 @@ def test_a_level_ridge_lies_as_who_looks_sees_it():
     chart = chart_of(meshes.polygon_surface(np.column_stack([flat, -np.abs(flat[:, 1])]), quads))
     (found,) = turn_upright([chart], [chart.vertices[:, :2] @ rotation(0.8).T], [UP], [(0, -1, 0)])
     np.testing.assert_allclose(found, chart.vertices[:, :2], atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.1])
+@pytest.mark.parametrize("fold, straight", [(0.5, True), (0.05, False)])
+def test_creases_decide_where_neither_sides_nor_outline_have_a_direction(angle, fold, straight):
+    """A round plate in triangles of any shape, folded up and down along three chords: these stand along an axis."""
+    at, arc = np.array([-0.5, 0.0, 0.5]), np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    ends = np.concatenate([np.stack([at, s * np.sqrt(1 - at**2)], axis=1) for s in (-1, 1)])
+    inner = np.random.default_rng(2).uniform(-1, 1, (160, 2))
+    inner = inner[(np.hypot(*inner.T) < 0.95) & (np.abs(inner[:, :1] - at).min(axis=1) > 0.06)]
+    along = [np.stack([np.full(30, x), np.linspace(-1, 1, 32)[1:-1] * np.sqrt(1 - x * x)], axis=1) for x in at]
+    flat = np.concatenate([ends, np.stack([np.cos(arc), np.sin(arc)], axis=1), *along, inner])
+    F = Delaunay(flat).simplices
+    F = np.where(signed_areas(flat, F)[:, None] > 0, F, F[:, ::-1])
+    height = fold * np.abs((flat[:, 0] + 0.5) % 1 - 0.5)
+    (chart,) = strict_charts(triangle_surface(np.column_stack([flat, height]), F))
+    uv = chart.vertices[:, :2] @ rotation(angle).T
+    (found,) = turn_upright([chart], [uv], [(0.6, 0.8, 0.1)])
+    # The chord through the middle, in the map.
+    on = np.abs(chart.vertices[:, 0]) < 1e-12
+    ends = found[on][np.argsort(chart.vertices[on, 1])][[0, -1]]
+    along = np.abs(ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    assert (along.min() < 0.02) == straight

@@ -503,9 +503,8 @@ def test_the_price_of_an_outline_is_its_length_and_its_turns():
 )
 def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, prices, parts, taken, monkeypatch):
     def with_prices(one, prices):
-        return SimpleNamespace(
-            pressing=np.array(one, float), bound=1.35, outline_price=np.array(prices, float), charts=list(one)
-        )
+        of_charts = {"pressing": np.array(one, float), "mean": np.array(one, float), "area": np.ones(len(one))}
+        return SimpleNamespace(**of_charts, bound=1.35, outline_price=np.array(prices, float), charts=list(one))
 
     chart = SimpleNamespace(vertices=np.zeros((5, 3)))
     last, new = with_prices([1.3, 1.3], [10, 8]), with_prices(pressing, prices)
@@ -523,6 +522,26 @@ def test_cuts_are_straighter_where_that_keeps_the_bound_and_the_chart(pressing, 
     assert asked[0] == [0, 1] and asked[1].changes["straighter"] and asked[1].changes["stays_whole"]
     assert asked[1].slits == ("slits", 0, 1)
     assert asked[1].is_worth(np.array([[1, 2]])) and not asked[1].is_worth(np.array([[1, 0]]))
+
+
+@pytest.mark.parametrize(
+    "before, now, taken",
+    [(1.1, 1.12, True), (1.1, 1.13, False), (1.11, 1.3, True), (1.0, 1.0, True), (1.0, 1.01, False)],
+)
+def test_straighter_cuts_leave_flat_what_is(before, now, taken, monkeypatch):
+    def round_with(shear, price):
+        of_charts = {"pressing": np.array([shear]), "mean": np.array([shear]), "area": np.ones(1)}
+        return SimpleNamespace(**of_charts, bound=1.35, outline_price=np.array([price]), charts=[chart])
+
+    chart = SimpleNamespace(vertices=np.zeros((5, 3)))
+    last, new = round_with(before, 10.0), round_with(now, 5.0)
+    last.cuts, last.found_for, last.kept = cuts_of([[0, 1]]), lambda k: ["found"], lambda chosen: chosen
+    last.slits_within, last.chart_of = lambda chosen: (), lambda search, other: np.array([0])
+    last.merged = lambda search, other, of, stay: stay
+    monkeypatch.setattr(shear_bound, "_cut_anew", cutting([], new))
+    search = SimpleNamespace(count=3, first_spread=lambda: np.full(3, 0.2), with_images=lambda charts, chosen: chosen)
+    found = drain(shear_bound._straightened(search, last, None, EarlyEnd()))
+    assert (found is not last) == taken
 
 
 @pytest.mark.parametrize(

@@ -136,3 +136,35 @@ def test_crossings_of_what_moves_are_crossings_of_all():
     everywhere = np.concatenate([crossings(w + share * step, loop) for share in (0.3, 1.0, 1.9)])
     assert len(everywhere) and {tuple(sorted(p)) for p in found.tolist()} == {tuple(p) for p in everywhere.tolist()}
     assert not len(crossings_on_the_way(w, 0 * step, loop, (1.0,)))
+
+
+def slit(gap=0.0):
+    """A square with a slit from its right side to its middle, whose sides are so far apart: an outline."""
+    y = 0.5 * gap
+    right = [1 - 0.5j - y * 1j, 1.0 - 1j * y, 0.5 - 1j * y]
+    return np.array([-1 - 1j, 0 - 1j, 1 - 1j, *right, 0, 0.5 + 1j * y, 1 + 1j * y, 1 + 1j, -1 + 1j, -1])
+
+
+@pytest.mark.parametrize("gap, moves", [(0.0, True), (1e-12, True), (0.02, True), (0.06, False), (0.3, False)])
+def test_what_touches_is_set_apart_and_nothing_else(gap, moves):
+    w = slit(gap)
+    loop = np.arange(len(w))
+    barrier = make_barrier(w, loop, 1.0)
+    step = barrier.set_apart(w)
+    assert (np.abs(step) > 0).any() == moves
+    if moves:
+        moved = w + step
+        assert not len(crossings(moved, loop)) and np.isfinite(barrier.energy(moved))
+        # Both sides go inwards, the tip of the slit and what lies off stay.
+        assert (step[[4, 5]].imag < 0).all() and (step[[7, 8]].imag > 0).all()
+        assert not step[[0, 1, 6, 9, 10, 11]].any() and np.abs(step).max() <= 0.1 * 0.5
+    # Turned, larger and elsewhere it is the same.
+    np.testing.assert_allclose(make_barrier(3j * w + 5, loop, 1.0).set_apart(3j * w + 5), 3j * step, atol=1e-12)
+
+
+def test_a_smaller_reach_is_that_share_of_the_edges():
+    w, loop = slot()
+    near, far = make_barrier(w, loop, 1.0, 0.05), make_barrier(w, loop, 1.0)
+    np.testing.assert_allclose(far.vertex_reach, 10 * near.vertex_reach)
+    np.testing.assert_allclose(far.edge_reach, 10 * near.edge_reach)
+    assert near.energy(w) < far.energy(w)

@@ -9,14 +9,18 @@ import numpy as np
 import polygons
 import pytest
 
+from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.maps.energy import area_error, elements
 from omt_uv.solver.maps.polygon_elements import polygon_elements
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
+from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import continuation
+from omt_uv.solver.refinement.boundary_barrier import CLOSE_REACH, REACH
 from omt_uv.solver.refinement.continuation import (
     MapProblem,
     StageLimits,
@@ -26,6 +30,7 @@ from omt_uv.solver.refinement.continuation import (
     minimise,
     minimise_in_stages,
     rescaled,
+    set_apart,
 )
 from omt_uv.solver.refinement.continuation_rules import (
     AHEAD,
@@ -247,3 +252,49 @@ def test_the_first_stage_goes_by_how_good_the_start_is(quality, balance, warm, p
         else:
             ahead = prolonged and balance == 0 and len(planned) > 1 and share < AHEAD
             assert (weights, before) == (planned[1:] if ahead else planned, False)
+
+
+def cut_open(height):
+    """A square of squares with a slit from one side to its middle and a low bump: vertices, triangles and its outline,
+    laid flat from above, where the sides of the slit lie on one another."""
+    n = 12
+    V, F = meshes.grid(n, n)
+    V[:, 2] = height * np.maximum(0, 1 - ((V[:, 0] - 0.75) ** 2 + (V[:, 1] - 0.25) ** 2) / 0.04)
+    row = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)[n // 2]
+    (chart,) = strict_charts(triangle_surface(V, F, np.stack([row[n // 2 : -1], row[n // 2 + 1 :]], axis=1)))
+    return chart.vertices, chart.triangles
+
+
+@pytest.mark.parametrize("height", [0.005, 0.02])
+def test_the_sides_of_a_slit_that_lie_on_one_another_neither_cross_nor_open(height):
+    V, F = cut_open(height)
+    loop, area = boundary_loops(F)[0], face_areas(V, F)
+    w = V[:, 0] + 1j * V[:, 1]
+    problem = MapProblem(
+        elements(V, F, area), Assembly(F, len(V)), FreeMotion(np.zeros(len(V), bool)), loop, with_barrier=False
+    )
+    found = drain(minimise_in_stages(problem, w, 0.0, QUALITIES["standard"]))
+    assert found.status == "converged" and not found.overlap and not problem.boundary_crosses(found.w)
+    # With a barrier that reaches as far as elsewhere it is 1.03.
+    assert face_distortion(V, F, np.stack([found.w.real, found.w.imag], axis=1)[F])[1] @ area / area.sum() < 1.006
+
+
+def test_what_would_fold_or_cross_is_not_set_apart():
+    V, F = cut_open(0.02)
+    problem, _ = problem_of(V, F)
+    w = V[:, 0] + 1j * V[:, 1]
+    newton = problem.newton_problem(w, 30.0, False)
+    stage = drain(minimise(newton, w, StageLimits(0.0, 50), 0, problem.boundary_crosses))
+    assert stage.status == "crossed"
+    closer, moved = set_apart(problem, newton, stage)
+    assert closer.reach == CLOSE_REACH and np.abs(moved - stage.w).max() > 0 and not problem.boundary_crosses(moved)
+    folded = SimpleNamespace(energy=lambda w: np.inf)
+    same, near = set_apart(problem, folded, stage)
+    assert same.reach == REACH and np.array_equal(near, stage.w)
+    # What does not touch goes most of the way to there, as ever.
+    V, F, w = ramp(1.3)
+    problem, _ = problem_of(V, F)
+    newton = problem.newton_problem(w, 1.0, False)
+    stage = drain(minimise(newton, w, StageLimits(0.0, 50), 0, problem.boundary_crosses))
+    same, near = set_apart(problem, newton, stage)
+    assert same is problem and np.array_equal(near, as_far_as_apart(problem, newton, stage))

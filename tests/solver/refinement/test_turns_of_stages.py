@@ -199,7 +199,7 @@ def staged(monkeypatch):
         monkeypatch.setattr(module, "target_error_but_share", lambda faces, w: 0.5 * error(faces, w))
         monkeypatch.setattr(module, "missing_tilt", lambda faces, w: 0.125)
         monkeypatch.setattr(module, "with_convex_quads", lambda faces, w: faces)
-        monkeypatch.setattr(module, "as_far_as_apart", lambda problem, newton, stage: stage.w + 100)
+        monkeypatch.setattr(module, "set_apart", lambda problem, newton, stage: (problem, stage.w + 100))
         monkeypatch.setattr(module, "_first_weights", lambda *_: (list(quality.area_weights), warm))
         monkeypatch.setattr(module, "_limits", lambda *words: StageLimits(0.01, words[4], float(words[3])))
         monkeypatch.setattr(MapProblem, "boundary_crosses", lambda self, w: crossed.pop(0) if crossed else False)
