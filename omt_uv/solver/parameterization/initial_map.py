@@ -26,7 +26,7 @@ from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES, SQUEEZED, UNSQUEEZED, is_squeezed
 from ..refinement.initial_maps import is_crowded
-from ..refinement.mesh_hierarchy import coarsen_disk
+from ..refinement.mesh_hierarchy import Collapsing, coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed_uv
 from ..transport.convex_domain import Domain
@@ -154,9 +154,9 @@ def coarse_initial_map(
 
     flat (n,2) : an embedding, a mean value map by default; draft : the map had better have its areas at once
     """
-    if flat is None and len(disk.vertices) > EMBEDDED and not (disk.is_far or draft):
+    if flat is None and (draft or len(disk.vertices) > EMBEDDED) and not disk.is_far:
         try:
-            found = yield from _coarse_initial_map(disk, balance, log, None, draft=False, embedded=False)
+            found = yield from _coarse_initial_map(disk, balance, log, None, draft, embedded=False)
         except MeshError:
             found = None  # an embedding of all of it says what it is
         if found is not None and map_energy(found.uv, disk.vertices, disk.triangles) < HOPELESS:
@@ -179,8 +179,8 @@ def _coarse_initial_map(
             if even is not None and not (draft and map_energy(even, vertices, triangles) > HOPELESS):
                 return InitialChartMap(even)
         density = density_of_vertices(vertices, triangles, disk.target, goal) if far else None
-        whole = draft and disk.boundary != "free"
-        steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density, whole)
+        how = Collapsing(whole_boundary=draft and disk.boundary != "free", light_first=draft)
+        steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density, how)
         coarse = yield from part_of(steps, *COARSENING)
     if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None
@@ -195,8 +195,8 @@ def _coarse_initial_map(
     if len(points) > most:
         coarser = coarse_initial_map(coarse_disk, balance, log, None if flat is None else flat[coarse.kept], draft)
         found = yield from part_of(coarser, *COARSE_MAP)
-    if found is None and draft and flat is not None:
-        found = _draft_start(coarse_disk, flat[coarse.kept], log)
+    if found is None and draft:
+        found = _draft_start(coarse_disk, None if flat is None else flat[coarse.kept], log)
     if found is None:
         found = yield from part_of(direct_initial_map(coarse_disk, log), *COARSE_MAP)
     quality = "freed" if disk.buried or found.freed else "sketch" if draft else "rough" if far else "relaxed"
@@ -272,13 +272,18 @@ def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, qu
     return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)
 
 
-def _draft_start(disk: DiskMesh, flat: np.ndarray, log: RunLog) -> InitialChartMap | None:
-    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2); with corners by evened weights, or None
-    where these squeeze it."""
+def _draft_start(disk: DiskMesh, flat: np.ndarray | None, log: RunLog) -> InitialChartMap | None:
+    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2), by default in a mean value map; with
+    corners by evened weights, or None where these squeeze it."""
     if disk.corners is not None:
         return evened_initial_map(disk, log, large=False)
     even = flat_initial_map(disk, log) if disk.boundary == "free" else None
-    return InitialChartMap(flat) if even is None else even
+    if even is not None:
+        return even
+    flat = disk.embedded if flat is None else flat
+    faces = elements(disk.vertices, disk.triangles, disk.target)
+    evened = evened_tutte(disk.vertices, disk.loop, flat, faces, SMOOTH_WEIGHT, order=disk.order)
+    return InitialChartMap(flat if evened is None else evened)
 
 
 def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:

@@ -279,6 +279,7 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         brisk=brisk,
         pressure=first_pressure(quality, balance, not problem.scale_free and not region),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
+        settled=quality.settled,
     )
 
 
@@ -304,7 +305,7 @@ class StageLimits:
     ends with a step that `continuation_rules.has_kept`; brisk : and with two that leave it nearly settled, see
     `continuation_rules.is_nearly_settled`, where areas need not be exact; shear : of a map, with which it ends where
     that settles, see `continuation_rules.is_settled`; pressure : of the first step, see
-    `continuation_rules.FIRST_PRESSURE`
+    `continuation_rules.FIRST_PRESSURE`; settled : see `continuation_rules.Quality`
     """
 
     area_error: float
@@ -319,6 +320,7 @@ class StageLimits:
     brisk: bool = False
     shear: Callable[[np.ndarray], float] | None = None
     pressure: float = FIRST_PRESSURE
+    settled: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -369,6 +371,8 @@ def minimise(
     value = problem.energy(w)
     steps, residual, status, pressure = 0, np.inf, "steps", limits.pressure
     error, figures, kept = np.inf, (np.inf, np.inf), False
+    if limits.settled and limits.shear is not None:
+        figures = (limits.shear(w), np.inf)
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
@@ -384,7 +388,7 @@ def minimise(
         met = met or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
         nearly = residual < max(limits.foreseen, limits.loose_tolerance) or left < limits.loose_tolerance
         # Limbs on a sphere trade their areas late: there only the last steps tell.
-        if limits.foreseeing and not met and (nearly or limits.expecting):
+        if limits.foreseeing and not met and (nearly or limits.expecting or limits.settled):
             before, error = error, problem.area_error(w)
             met = nearly and bool(is_out_of_reach(error, before, limits.area_error))
         if limits.shear is not None and not met:
@@ -392,6 +396,8 @@ def minimise(
             met = bool(is_settled(step.share, figures, last, limits.area_error))
             near = kept and twice and limits.brisk and residual < NEAR_THE_END
             met = met or bool(is_nearly_settled(near, figures, last, limits.area_error))
+            if limits.settled:
+                met = met or bool(is_nearly_settled(kept, figures, last, limits.area_error, limits.settled))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

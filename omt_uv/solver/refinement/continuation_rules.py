@@ -43,6 +43,8 @@ SETTLED_AREAS = 0.1
 # The same, whatever became of the areas, where it has kept its promise as well: what it changes by shrinks with the
 # square then.
 NEARLY_SETTLED = 0.08
+# The same of drafts: the next step changes it by less.
+DRAFTED = 0.2
 # What a step promised, over the energy that it left, for a stage to be over with it: one on the way, and the last. What
 # promised more has only begun, as on a closed body with a short slit.
 PASSED = 4.0
@@ -129,6 +131,8 @@ class Quality:
     tolerance : where the area error is not reached, a weight is left for a greater one when Newton promises less than
         this share of the energy. A small one costs steps and saves shear.
     loose_tolerance : the same where it is reached, at the end
+    settled : share by which a full step that has kept its promise may change the shear to be the last one, where it has
+        the areas; 0 for none but what is seen by nobody, see NEARLY_SETTLED
     """
 
     area_error: float
@@ -137,6 +141,7 @@ class Quality:
     max_steps: int
     tolerance: float
     loose_tolerance: float = LOOSE
+    settled: float = 0.0
 
 
 # What users are told of "standard", which aims lower. Triangles within it, from quads that were solved as one, stay:
@@ -160,11 +165,23 @@ QUALITIES = {
     "rough": Quality(area_error=0.03, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=80, tolerance=1e-2),
     # For that of a draft. Sweeps of the fine mesh do what is left.
     "sketch": Quality(
-        area_error=0.035, area_weights=(30.0,), greatest_weight=4e3, max_steps=30, tolerance=0.3, loose_tolerance=0.3
+        area_error=0.035,
+        area_weights=(30.0,),
+        greatest_weight=4e3,
+        max_steps=30,
+        tolerance=0.3,
+        loose_tolerance=0.3,
+        settled=DRAFTED,
     ),
     # Areas about right, whatever is left of the shear.
     "draft": Quality(
-        area_error=0.05, area_weights=(100.0,), greatest_weight=1e3, max_steps=40, tolerance=0.1, loose_tolerance=0.5
+        area_error=0.05,
+        area_weights=(100.0,),
+        greatest_weight=1e3,
+        max_steps=40,
+        tolerance=0.1,
+        loose_tolerance=0.5,
+        settled=DRAFTED,
     ),
     "standard": Quality(
         area_error=0.008, area_weights=(30.0, 500.0), greatest_weight=1e6, max_steps=150, tolerance=3e-2
@@ -312,10 +329,12 @@ def is_settled(share: Number, now: tuple[Number, Number], before: tuple[Number, 
     return (share == 1) & (error <= goal) & same
 
 
-def is_nearly_settled(kept: Truth, now: tuple[Number, Number], before: tuple[Number, Number], goal: Number) -> Truth:
-    """Whether a step that has kept its promise changed the shear by so little that the next one will not be seen, with
-    an area error at its goal; now, before: shear and area error."""
-    return kept & (now[1] <= goal) & (np.abs(now[0] - before[0]) <= NEARLY_SETTLED * now[0])
+def is_nearly_settled(
+    kept: Truth, now: tuple[Number, Number], before: tuple[Number, Number], goal: Number, share: Number = NEARLY_SETTLED
+) -> Truth:
+    """Whether a step that has kept its promise changed the shear by so little, this share, that the next one will not
+    be seen, with an area error at its goal; now, before: shear and area error."""
+    return kept & (now[1] <= goal) & (np.abs(now[0] - before[0]) <= share * now[0])
 
 
 def is_enough(quality: Quality, balance: float, error: Number, weight: Number) -> Truth:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..maps.energy import Elements, elements
 from ..mesh.geometry import complex_cross, cross2, cross3, face_areas, lengths, of_corners
-from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, twins
+from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
 
@@ -106,16 +106,26 @@ class CoarseMesh:
         return np.column_stack([w.real, w.imag])
 
 
+@dataclass(frozen=True)
+class Collapsing:
+    """Which vertices are to go; whole_boundary: none of the boundary, however many they are of those that are left;
+    light_first: those with few faces sooner, which lets more of them go in a round (Kirkpatrick 1983)."""
+
+    whole_boundary: bool = False
+    light_first: bool = False
+
+
 def coarsen_disk(
-    vertices, triangles, flat, mass, goal: int, region=None, density=None, whole_boundary=False
+    vertices, triangles, flat, mass, goal: int, region=None, density=None, how: Collapsing | None = None
 ) -> Steps[CoarseMesh]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
     flat (n,2): an embedding in the plane with a convex boundary, or None; mass (m,): what the triangles' areas in the
     final map are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass;
     density (n,): how many vertices are to be left there for an area, relative to elsewhere; by default that is left to
-    chance; whole_boundary: its vertices stay, however many they are of those that are left.
+    chance.
     """
+    how = how or Collapsing()
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
     rounds: list[RemovalRound] = []
     left = count = len(vertices)
@@ -123,11 +133,15 @@ def coarsen_disk(
     while left > goal:
         yield Progress("Coarser mesh", np.log(count / left) / np.log(count / goal))
         rank = np.random.default_rng(len(rounds)).permutation(count)
-        if whole_boundary or len(boundary) <= BOUNDARY_SHARE * left:
+        if how.light_first:
+            rank += count * (MOST_FACES - np.minimum(MOST_FACES, np.bincount(triangles.ravel(), minlength=count)))
+        if how.whole_boundary or len(boundary) <= BOUNDARY_SHARE * left:
             rank[boundary] = -1
         if density is not None:
             rank[_heavy(vertices, triangles, density)] = -1
-        triangles, mass, removal = _round(vertices, triangles, flat, mass, rank)
+        ahead = np.full(count, -1)
+        ahead[boundary] = np.roll(boundary, -1)
+        triangles, mass, removal = _round(vertices, triangles, flat, mass, rank, ahead)
         rounds.append(removal)
         left -= len(removal.vertex)
         stays = np.ones(count, bool)
@@ -150,12 +164,9 @@ def _heavy(V, F, density):
     return weight > HEAVY * weight[weight > 0].mean()
 
 
-def _round(V, F, flat, mass, rank):
-    """Collapse an independent set: triangles and mass afterwards, and the removal."""
-    tail, head = halfedges(F)
-    boundary = twins(F) < 0
-    ahead = np.full(len(V), -1)
-    ahead[tail[boundary]] = head[boundary]
+def _round(V, F, flat, mass, rank, ahead):
+    """Collapse an independent set: triangles and mass afterwards, and the removal. ahead (n,): of a vertex of the
+    boundary the next one, else -1."""
     count = np.bincount(F.ravel(), minlength=len(V))
     star, turned = stars(F, independent_set(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
     v, after, before = np.take_along_axis(F[star], turned, 1).T

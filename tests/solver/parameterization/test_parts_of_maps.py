@@ -764,11 +764,19 @@ def test_drafts_and_direct_starts_are_flat_only_where_the_boundary_is_free(bound
     monkeypatch.setattr(initial_map, "flat_initial_map", lambda *_: "flat")
     monkeypatch.setattr(initial_map, "initial_map", steps_of("transported"))
     assert drain(initial_map.direct_initial_map(disk, RunLog())) == ("flat" if boundary == "free" else "transported")
+    evened = []
+    monkeypatch.setattr(initial_map, "evened_tutte", lambda *given, **_: evened.append(given[2]))
     draft = initial_map._draft_start(disk, "embedded", RunLog())
     assert draft == "flat" if boundary == "free" else draft.uv == "embedded"
     monkeypatch.setattr(initial_map, "flat_initial_map", lambda *_: None)
     assert drain(initial_map.direct_initial_map(disk, RunLog())) == "transported"
     assert initial_map._draft_start(disk, "embedded", RunLog()).uv == "embedded"
+    # By default from a mean value map, and evened where that can be.
+    disk.__dict__["embedded"] = "mean values"
+    assert initial_map._draft_start(disk, None, RunLog()).uv == "mean values"
+    assert evened == ["embedded"] * (1 if boundary == "free" else 2) + ["mean values"]
+    monkeypatch.setattr(initial_map, "evened_tutte", lambda *_, **__: "evened")
+    assert initial_map._draft_start(disk, None, RunLog()).uv == "evened"
 
 
 @pytest.mark.parametrize(

@@ -110,9 +110,10 @@ def test_a_coarser_mesh_of_very_large_charts_is_embedded_first(count, embedded, 
 
     monkeypatch.setattr(initial_map, "_coarse_initial_map", coarse)
     disk = sized(count, is_far=given.pop("far", False))
-    everywhere = not given and not disk.is_far
+    bare = "flat" not in given and not disk.is_far
     assert drain(initial_map.coarse_initial_map(disk, 0.0, RunLog(), **given)) is None
-    assert asked == (embedded if everywhere else [True])
+    # Of drafts the coarser mesh alone is, whatever their size.
+    assert asked == ([False, True] if given.get("draft") else embedded if bare else [True])
 
 
 @pytest.mark.parametrize("energy, tries", [(49.9, 1), (50.0, 2)])

@@ -17,7 +17,7 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import mesh_hierarchy
-from omt_uv.solver.refinement.mesh_hierarchy import coarsen_disk
+from omt_uv.solver.refinement.mesh_hierarchy import Collapsing, coarsen_disk
 from omt_uv.solver.refinement.vertex_sweeps import smoothed
 from omt_uv.solver.transport.convex_domain import Disk
 
@@ -81,7 +81,7 @@ def test_no_edge_is_made_twice_by_collapses_of_one_round():
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_whole_boundary_of_a_mesh_that_is_not_embedded_stays_where_it_is_asked_to(name):
-    _, F, _, coarse = bare(name, 40, whole_boundary=True)
+    _, F, _, coarse = bare(name, 40, how=Collapsing(whole_boundary=True))
     assert np.isin(boundary_loops(F)[0], coarse.kept).all()
 
 
@@ -98,7 +98,7 @@ def test_the_whole_boundary_stays_where_it_is_asked_to(name):
     """However few inner vertices are left beside it; otherwise some of it goes, too."""
     V, F, flat, mass, less = coarse_of(name, 40)
     loop = boundary_loops(F)[0]
-    coarse = drain(coarsen_disk(V, F, flat, mass, len(V) // 40, whole_boundary=True))
+    coarse = drain(coarsen_disk(V, F, flat, mass, len(V) // 40, how=Collapsing(whole_boundary=True)))
     assert np.isin(loop, coarse.kept).all() and not np.isin(loop, less.kept).all()
     kept = coarse.kept[boundary_loops(coarse.triangles)[0]]
     np.testing.assert_array_equal(np.roll(kept, -int(np.argmax(kept == loop[0]))), loop)

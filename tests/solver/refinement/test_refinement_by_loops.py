@@ -214,13 +214,20 @@ def test_collapses_go_where_no_face_turns_over_and_the_worst_is_best(flat):
             assert scores[goal] > max(scores.values()) - 1 / 20
 
 
+def ahead_of(V, F):
+    """The next vertex of the boundary (n,), -1 for those inside."""
+    loop, ahead = boundary_loops(F)[0], np.full(len(V), -1)
+    ahead[loop] = np.roll(loop, -1)
+    return ahead
+
+
 @pytest.mark.parametrize("flat", [True, False])
 def test_a_round_of_collapses_keeps_areas_masses_and_the_way_back(flat):
     V, F = meshes.random_disk(80, 4, height=0.0)
     uv = V[:, :2].copy()
     mass = np.random.default_rng(0).uniform(0.5, 2, (len(F), 2))
     rank = np.random.default_rng(1).permutation(len(V))
-    triangles, handed, removal = mesh_hierarchy._round(V, F, uv if flat else None, mass, rank)
+    triangles, handed, removal = mesh_hierarchy._round(V, F, uv if flat else None, mass, rank, ahead_of(V, F))
     np.testing.assert_allclose(handed.sum(axis=0), mass.sum(axis=0))
     assert not np.isin(triangles, removal.vertex).any() and len(removal.vertex) > 10
     assert (signed_areas(uv, triangles) > 0).all()
@@ -247,7 +254,7 @@ def test_the_share_of_a_chord_is_by_lengths_of_the_boundary():
     V[2, 0] += 0.05
     rank = np.full(len(V), -1)
     rank[2] = 1
-    _, _, removal = mesh_hierarchy._round(V, F, V[:, :2].copy(), np.ones((len(F), 1)), rank)
+    _, _, removal = mesh_hierarchy._round(V, F, V[:, :2].copy(), np.ones((len(F), 1)), rank, ahead_of(V, F))
     loop = boundary_loops(F)[0]
     at = loop.tolist().index(2)
     before, ahead = loop[at - 1], loop[at + 1]
