@@ -39,10 +39,10 @@ LARGE_KEPT = 7000
 SIZE_KEPT = 250
 # Iterations at most by factors that were kept, less one for each group of them that is made anew before, which takes a
 # little longer than one. What these come to is a step all the same.
-MOST_KEPT = 9
+MOST_KEPT = 6
 # From so many on, some of the factors are made anew for the next matrix: RENEWED of so many groups of parts, and of the
 # coarse equations, in turn. All of them in one step would take as long as two other steps.
-FEW = 6
+FEW = 5
 GROUPS = 6
 RENEWED = 2
 # Neighbours of a vertex beyond which it is no part of any overlap.
@@ -103,7 +103,8 @@ class AdditiveSchwarz:
         matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
         if self._kept is not None:
             self._renew(self._kept, matrix, w, axes)
-            self._last, _ = nearly(matrix, b, self._kept, self._kept.most, KEPT_ENOUGH, self._last)
+            self._last, done = nearly(matrix, b, self._kept, self._kept.most, KEPT_ENOUGH, self._last)
+            self._kept.short = not done
             return self._last
         x = self._solved_anew(matrix, b, w, axes)
         self._last = x if self._keep else None
@@ -114,7 +115,7 @@ class AdditiveSchwarz:
         """Make some of the factors anew where the last matrix took more than a few iterations by those there are, and
         in the end all where it took too many: conjugate gradients may stand still by factors of which some are good."""
         every = len(kept.groups) + 1
-        kept.left = max(kept.left, every if kept.calls >= kept.most else RENEWED if kept.calls >= FEW else 0)
+        kept.left = max(kept.left, every if kept.short else RENEWED if kept.calls >= FEW else 0)
         kept.calls, now = 0, min(RENEWED, kept.left)
         kept.left, kept.most = kept.left - now, MOST_KEPT - now
         for _ in range(now):
@@ -201,15 +202,15 @@ class _Kept:
     """A preconditioner: `groups` of unknowns and factors of parts, which unknowns `moves` (2n,) bool, the motions
     `spread` of the parts and the factors `coarse` of theirs.
 
-    calls : since the last matrix, and `most` of them; turn : the group that is made anew next; left : how many there
-    are to be made
+    calls : since the last matrix, and `most` of them; short : whether these were too few; turn : the group that is made
+    anew next; left : how many there are to be made
     """
 
     def __init__(self, groups: list, moves: np.ndarray, spread: sp.csr_matrix, coarse: Factor):
         self.groups: list[list[tuple[np.ndarray, Factor]]] = groups
         self.moves, self.spread, self.coarse = moves, spread, coarse
         self.calls = self.turn = self.left = 0
-        self.most = MOST_KEPT
+        self.most, self.short = MOST_KEPT, False
 
     def __call__(self, r: np.ndarray) -> np.ndarray:
         self.calls += 1
