@@ -27,7 +27,7 @@ def read_volume_body(obj: bpy.types.Object) -> VolumeBody:
     groups = [group.name for group in obj.vertex_groups if group.name.startswith(LANDMARK)]
     inside = {name: members(obj, name) for name in groups}
     landmarks = {name: np.flatnonzero(m) for name, m in inside.items() if m is not None and m.any()}
-    return VolumeBody(obj.name, body.positions, body.triangles, landmarks)
+    return VolumeBody(obj.name, body.positions, body.triangles, landmarks, body.polygons)
 
 
 def _added(name: str, like: bpy.types.Object, vertices, faces) -> bpy.types.Object:

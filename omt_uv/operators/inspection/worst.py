@@ -46,6 +46,10 @@ class UV_OT_omt_worst(QuickOperator, bpy.types.Operator):
         if not count:
             raise Complaint("No face is folded." if self.figure == "FOLDS" else "No face stands out.")
         if context.mode == "OBJECT":
+            active = context.view_layer.objects.active
+            if active not in [obj for obj, _ in pairs]:
+                # Of another kind, or not selected: its own Edit Mode has no faces.
+                context.view_layer.objects.active = pairs[0][0]
             bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_all(action="DESELECT")
         context.scene.tool_settings.mesh_select_mode = select_mode("face")

@@ -22,12 +22,14 @@ TETWILD = "tetwild"
 
 @dataclass(frozen=True)
 class VolumeBody:
-    """Positions (n,3) and triangles (m,3) of a closed body, and vertices (k,) of its landmarks by their names."""
+    """Positions (n,3) and triangles (m,3) of a closed body, vertices (k,) of its landmarks by their names, and the
+    polygon (m,) of every triangle, None where these are the polygons."""
 
     name: str
     positions: np.ndarray
     triangles: np.ndarray
     landmarks: dict[str, np.ndarray]
+    polygons: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def mapped_volume(body: VolumeBody, settings: VolumeSettings, other: VolumeBody 
 
     Raises
     ------
-    MeshError : those of `solver.volumes.volume_map`; elements are vertices, edges and triangles of the body
+    MeshError : those of `solver.volumes.volume_map`; elements are vertices, edges and polygons of the body
     HandleError : the domain is "body", and there is none, or landmarks contradict each other
     """
     domain = "ball" if settings.domain == BODY else settings.domain
@@ -107,8 +109,13 @@ def _own(body: VolumeBody, found: VolumeMap) -> np.ndarray:
 def _mapped(body: VolumeBody, domain: str, settings: VolumeSettings) -> Steps[tuple[VolumeBody, VolumeMap]]:
     """A body, as it is after a library has replaced its surface, and its map."""
     if settings.library != TETWILD:
-        steps = volume_map(body.positions, body.triangles, domain, settings.method, settings.count)
-        found = yield from steps
+        try:
+            found = yield from volume_map(body.positions, body.triangles, domain, settings.method, settings.count)
+        except MeshError as error:
+            if error.kind != "face" or body.polygons is None:
+                raise
+            polygons = np.unique(body.polygons[error.elements])
+            raise type(error)(error.cause, error.remedy, error.kind, polygons) from error
         return body, found
     new = filled(body.positions, body.triangles, settings.count)
     _, nearest = cKDTree(new.vertices).query(body.positions)

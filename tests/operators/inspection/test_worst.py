@@ -122,3 +122,22 @@ def test_faces_are_what_edit_mode_shows_and_nothing_else_is_selected(mode, befor
     assert bpy.ops.uv.omt_worst(figure="AREA", share=100 * 8.5 / 48) == {"FINISHED"}
     assert bpy.context.mode == "EDIT_MESH" and tuple(tools.mesh_select_mode) == (False, False, True)
     assert selected(obj) == set(around)
+
+
+@pytest.mark.parametrize("beside", ["curve", "mesh", "nothing"])
+def test_what_is_active_beside_the_meshes_is_not_edited(beside):
+    """A curve that is active has an Edit Mode of its own, a mesh that is not selected faces of its own."""
+    obj = scenes.bump(8, 6, height=0.0)
+    uv = scenes.seen_from_above(obj)
+    uv[list(obj.data.polygons[20].loop_indices)] *= 3
+    scenes.set_uv(obj, uv)
+    if beside == "curve":
+        other = bpy.data.objects.new("Curve", bpy.data.curves.new("Curve", "CURVE"))
+        bpy.context.collection.objects.link(other)
+    else:
+        other = scenes.bump(name="Other", offset=2.0) if beside == "mesh" else None
+    scenes.select([obj] if beside == "mesh" else list(filter(None, [obj, other])))
+    bpy.context.view_layer.objects.active = other
+    assert bpy.ops.uv.omt_worst(figure="AREA", share=1.0) == {"FINISHED"}
+    assert bpy.context.mode == "EDIT_MESH" and list(bpy.context.objects_in_mode) == [obj]
+    assert selected(obj) == {20}

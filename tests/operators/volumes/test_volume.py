@@ -98,3 +98,15 @@ def test_bad_bodies_are_named_and_nothing_is_made(monkeypatch):
     scenes.select([scenes.add(V, F, "Ball")])
     assert "pip install tetgen" in scenes.error_of(bpy.ops.object.omt_volume, tets=500)
     assert len(bpy.data.objects) == count + 2
+
+
+def test_faces_that_are_wrong_are_those_of_the_mesh_and_are_selected():
+    """Of a mesh of quads its triangles are others, and there are more of them."""
+    cube = scenes.cube()
+    mesh = cube.data
+    points, faces = [tuple(v.co) for v in mesh.vertices], [tuple(p.vertices) for p in mesh.polygons]
+    obj = scenes.add(points, [*faces, faces[3][:3], faces[3][:3]], "Twice")
+    scenes.select([obj])
+    told = scenes.error_of(bpy.ops.object.omt_volume, tets=100)
+    assert "Traceback" not in told and "(3 faces: 3, 6, 7)" in told, told
+    assert [p.index for p in obj.data.polygons if p.select] == [3, 6, 7]
