@@ -1,4 +1,4 @@
-"""Every constant of a module or a class: a table keeps it, so that a bound, a size or a choice changes on purpose."""
+"""Every constant of a module or a class, and every setting of a preset: a table keeps it, so that a bound, a size or a choice changes on purpose."""
 
 from __future__ import annotations
 
@@ -59,7 +59,16 @@ def rows():
                     yield "\t".join([module, prefix + name, "", said.replace("\n", " ").replace("\t", " ")])
 
 
+def presets():
+    """A line of each setting of a preset that comes with the extension."""
+    for path in sorted((ROOT / "omt_uv" / "presets").glob("**/*.py")):
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Attribute):
+                name = f"{path.parent.name} {path.stem}"
+                yield "\t".join([f"presets {name}", node.targets[0].attr, "", ast.unparse(node.value)])
+
+
 def test_constants_are_those_of_the_table():
-    lines = list(rows())
+    lines = [*rows(), *presets()]
     assert len(lines) > 400
     check(TABLE, lines)

@@ -1,5 +1,6 @@
 """What every function of `omt_uv/blender` that asks for objects alone gives, refuses and changes, of two objects in
-many states: edited, mirrored and scaled unevenly, with keys, smooth, bare, without faces; a few figures of each in a table.
+many states: edited, mirrored and scaled unevenly, with keys, smooth, bare, without faces; a table has a few figures of
+each.
 
 OMT_UV_ACCEPT=1 writes it anew, OMT_UV_ACCEPT=fewer leaves out rows that do not hold here."""
 

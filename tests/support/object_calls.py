@@ -18,6 +18,7 @@ import scenes
 from mathutils import Matrix
 
 import omt_uv.blender
+from omt_uv.blender import read_attributes
 
 # What is given for parameters of these names, each in turn; functions that ask for anything else are left out.
 NAMES = ("part", "none", "gone")
@@ -52,6 +53,9 @@ SEVERAL = {
     "kind": ("vertex", "edge", "face"), "levels": (1,), "group_names": (("part", "none"),),
     "write": ("MATERIALS", "MESH"),
 }  # fmt: skip
+SEVERAL |= dict.fromkeys(("attribute", "a layer"), ())
+# Of these there is one for every attribute of a mesh.
+LAYERS = ("UVMap", "Second", "zone", "height", "byte_color", "float_color", "sharp_edge", "material_index", "position")
 # What asks Blender for a window, or changes how it starts.
 LEFT_OUT = {
     "versions.settle_context",
@@ -70,10 +74,13 @@ def _objects() -> None:
         scenes.set_uv(obj, 0.5 * scenes.seen_from_above(obj), "Second")
         scenes.pin(obj, [0, 3 + k])
         for group, rows, weight in (("part", [0, 1, 5, 6], 0.8), ("second", [2 + k], 1.0), ("none", [], 1.0),
-                                    ("LM_0", [4], 1.0), ("LM_1", [7 + k], 0.4)):  # fmt: skip
+                                    ("LM_0", [4], 1.0), ("LM_1", [7 + k], 0.4), ("of LM_0", [8], 1.0)):  # fmt: skip
             obj.vertex_groups.new(name=group).add(rows, weight, "REPLACE")
         mesh.attributes.new("zone", "INT", "FACE").data.foreach_set("value", np.arange(faces) % 3)
         mesh.attributes.new("height", "FLOAT", "POINT").data.foreach_set("value", [v.co.z for v in mesh.vertices])
+        for kind in ("BYTE_COLOR", "FLOAT_COLOR"):
+            colours = mesh.color_attributes.new(kind.lower(), kind, "CORNER")
+            colours.data.foreach_set("color", np.linspace(0, 1, 4 * len(mesh.loops)))
         for material in ("one", "two"):
             mesh.materials.append(bpy.data.materials.get(material) or bpy.data.materials.new(material))
         mesh.polygons.foreach_set("material_index", np.arange(faces) % 2)
@@ -145,7 +152,8 @@ def functions() -> Iterator[tuple[str, Callable, list[str]]]:
         for name, function in sorted(vars(module).items()):
             if getattr(function, "__module__", "") != info.name or not inspect.isfunction(function):
                 continue
-            asked = [p.name for p in inspect.signature(function).parameters.values() if p.default is p.empty]
+            asked = [p.name if "Layer" not in str(p.annotation) else "a layer"
+                     for p in inspect.signature(function).parameters.values() if p.default is p.empty]  # fmt: skip
             known = all(each in GIVEN or each in SEVERAL for each in asked)
             if asked and known and f"{short}.{name}" not in LEFT_OUT:
                 yield f"{short}.{name}", function, asked
@@ -154,7 +162,7 @@ def functions() -> Iterator[tuple[str, Callable, list[str]]]:
 def choices(asked: list[str]) -> Iterator[dict]:
     """What a function is called with: a value of each that has several."""
     several = [name for name in asked if name in SEVERAL]
-    for values in itertools.product(*(SEVERAL[name] for name in several)):
+    for values in itertools.product(*(SEVERAL[name] or LAYERS for name in several)):
         yield dict(zip(several, values, strict=True))
 
 
@@ -190,10 +198,18 @@ def left() -> int:
     return zlib.crc32(repr(found).encode())
 
 
+def _given(name: str, chosen: dict):
+    """What stands for a parameter."""
+    if name in ("attribute", "a layer"):
+        attribute = bpy.data.objects["A"].data.attributes[chosen[name]]
+        return attribute if name == "attribute" else read_attributes._layer(attribute)
+    return chosen[name] if name in chosen else GIVEN[name]()
+
+
 def outcome(function: Callable, asked: list[str], chosen: dict) -> np.ndarray:
     """Figures (2,) of what a call gives, or of why it refuses."""
-    given = [chosen[name] if name in chosen else GIVEN[name]() for name in asked]
     try:
+        given = [_given(name, chosen) for name in asked]
         found = _plain(function(*given))
     except Exception as error:  # noqa: BLE001, which one it is counts
         found = error
