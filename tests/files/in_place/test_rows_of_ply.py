@@ -1,0 +1,78 @@
+"""Rows of a .ply whose UVs stay keep every byte, whatever kind of numbers its UVs are, in which order its elements are,
+and whether its last line ends."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from mesh_bytes import imported
+
+from omt_uv.files.in_place import ply
+
+PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+# Of these single precision has none.
+UVS = [(0.1, 0.2), (0.9, 0.3), (1 / 3, 0.7), (0.123456789012, 0.6)]
+FACE = [[0, 1, 2, 3]]
+FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+def file_of(form: str, kind: str, faces_first: bool, end: str, ends: bool) -> bytes:
+    """A square; `ends`: whether the last line of a text ends."""
+    vertex = ["element vertex 4", *(f"property float {a}" for a in "xyz"), *(f"property {kind} {a}" for a in "st")]
+    face = ["element face 1", "property list uchar int vertex_indices"]
+    parts = [face, vertex] if faces_first else [vertex, face]
+    head = ["ply", f"format {form} 1.0", *parts[0], *parts[1], "end_header"]
+    order = FORMS[form]
+    if not order:
+        rows = [[f"{p[0]:g} {p[1]:g} {p[2]:g}  {s!r} {t!r}" for p, (s, t) in zip(PLACES, UVS, strict=True)],
+                ["4 0 1 2 3"]]  # fmt: skip
+        lines = [*head, *(rows[1] + rows[0] if faces_first else rows[0] + rows[1])]
+        return (end.join(lines) + end * ends).encode()
+    width = "d" if kind == "double" else "f"
+    vertices = b"".join(struct.pack(f"{order}3f2{width}", *p, *uv) for p, uv in zip(PLACES.tolist(), UVS, strict=True))
+    faces = struct.pack(f"{order}B4i", 4, 0, 1, 2, 3)
+    return (end.join(head) + end).encode() + (faces + vertices if faces_first else vertices + faces)
+
+
+@pytest.mark.parametrize("ends", [True, False])
+@pytest.mark.parametrize("faces_first", [False, True])
+@pytest.mark.parametrize("kind", ["float", "double"])
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("moved", [[], [3], [1, 2], [0, 1, 2, 3]])
+def test_only_vertices_whose_uvs_change_have_other_bytes(moved, form, kind, faces_first, ends):
+    data = file_of(form, kind, faces_first, "\n", ends or bool(FORMS[form]))
+    wished = ply.read_uv(data)[1].astype(np.float32)
+    wished[moved] += np.float32(0.25)
+    new, told = ply.put(data, [imported(FACE, wished, PLACES)])
+    assert told == [] and (ply.read_uv(new)[1].astype(np.float32) == wished).all()
+    old_rows, rows = (ply.read(d).rows["vertex"].start for d in (data, new))
+    for k in range(4):
+        before, after = data[old_rows[k] : old_rows[k + 1]], new[rows[k] : rows[k + 1]]
+        # A last line that has no end gets one.
+        assert (before.rstrip(b"\n") if not FORMS[form] else before) == (
+            after.rstrip(b"\n") if not FORMS[form] else after
+        ) or k in moved, k
+        if k in moved:
+            assert before != after
+    if not FORMS[form]:
+        assert len(new.splitlines()) == len(data.splitlines()) and all(new.splitlines())
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_vertex_that_is_split_stands_behind_all_others_also_where_the_last_line_has_no_end(form, ends):
+    """Two faces that share an edge, whose corners there part."""
+    data = file_of(form, "float", True, "\n", ends or bool(FORMS[form]))
+    if FORMS[form]:
+        faces = b"".join(struct.pack(f"{FORMS[form]}B3i", 3, *f) for f in ((0, 1, 2), (0, 2, 3)))
+        data = data.replace(struct.pack(f"{FORMS[form]}B4i", 4, 0, 1, 2, 3), faces)
+    else:
+        data = data.replace(b"4 0 1 2 3", b"3 0 1 2\n3 0 2 3")
+    data = data.replace(b"element face 1", b"element face 2")
+    wished = np.random.default_rng(3).random((6, 2)).astype(np.float32)
+    new, _ = ply.put(data, [imported([[0, 1, 2], [0, 2, 3]], wished, PLACES)])
+    mesh, uv = ply.read_uv(new)
+    assert len(mesh.positions) == 6 and (uv.astype(np.float32) == wished).all()
+    assert (mesh.positions[mesh.corner_vertex] == PLACES[[0, 1, 2, 0, 2, 3]]).all()
