@@ -1,5 +1,5 @@
 """Every constant of a module or a class, and every setting of a preset: a table keeps it, so that a bound, a size or a
-choice changes on purpose.
+choice changes on purpose."""
 
 from __future__ import annotations
 
