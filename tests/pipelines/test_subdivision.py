@@ -170,3 +170,14 @@ def test_areas_on_the_subdivided_surface_are_kept_whether_cages_are_refined_or_a
 def refined_as_it_is(surface, layout):
     """The map of a layout after another refinement: itself where there is none."""
     return drain(refined_on_subdivision(surface, layout.maps[0], MODIFIER, None, "free"))
+
+
+@pytest.mark.parametrize("most", [1, 100, 400, 10**6])
+def test_uvs_have_as_many_levels_as_the_surface_also_where_these_are_fewer_than_asked_for(monkeypatch, most):
+    monkeypatch.setattr(subdivision, "MOST_QUADS", most)
+    surface = bowl()
+    uv = np.random.default_rng(0).random((len(surface.corner_vertex), 2)).astype(np.float32)
+    found = evaluated(read(surface, uv, replace(MODIFIER, levels=3)))
+    assert found.uv.shape == (len(found.surface.corner_vertex), 2)
+    quads = {1: 1, 100: 1, 400: 2, 10**6: 3}
+    assert len(found.surface.face_start) - 1 == 20 * 4 ** quads[most]

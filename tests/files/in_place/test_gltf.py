@@ -234,3 +234,15 @@ def test_tangents_are_told_of_where_uvs_beside_them_have_changed(monkeypatch, ch
         monkeypatch.setattr(glb, name, lambda *_: None)
     new, told = glb._put("glb", [], False)
     assert new == ("new" if changed else None) and len(told) == (1 in changed)
+
+
+@pytest.mark.parametrize("names", [("Cube", "Cube"), ("Cube", "Other"), ("Other", "Cube")])
+def test_every_mesh_of_a_file_is_found_once_also_where_meshes_and_names_are_alike(monkeypatch, names):
+    doc = {"meshes": [{"name": name, "primitives": []} for name in names], "nodes": [{"mesh": 0}, {"mesh": 1}]}
+    meshes = glb._Meshes(SimpleNamespace(doc=doc))
+    monkeypatch.setattr(glb._Meshes, "_corners", lambda self, k, mesh: np.array([k]))
+    found = [meshes.find(SimpleNamespace(name="Cube"))[0] for _ in names]
+    first = names.index("Cube")
+    assert found == [first, 1 - first]
+    with pytest.raises(InPlaceError, match="none of the file's"):
+        meshes.find(SimpleNamespace(name="Cube"))
