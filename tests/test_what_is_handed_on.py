@@ -24,6 +24,7 @@ LEFT_OUT = {
     ),
     ("_coarse_initial_map", "DiskMesh"): (("polygons",), "a coarser mesh has triangles alone"),
     ("move_pins", "NewtonProblem"): (("smoother", "symmetry"), "pins are drawn to their places without either"),
+    ("_mapped", "VolumeBody"): (("polygons",), "a surface that a library made has triangles alone"),
     ("_least_on_disk", "Signature"): (("floor",), "costs of single points have none"),
     ("_refined", "Signature"): (("floor",), "costs of single points have none"),
 }

@@ -29,8 +29,7 @@ PLAIN = (bool, int, float, complex, str, bytes, np.ndarray, np.generic, Enum, ty
 # What is taken from a call is neither a number nor anything in it, but the argument itself.
 LEFT_OUT = "left out"
 # What works with processes, with Blender's window, and with what other calls have left.
-ELSEWHERE = ("supervision.", "batch.", "session.run.", "session.live.", "session.following.", "operators.live.",
-             "registration.", "cli.", "panels.keymap.")  # fmt: skip
+ELSEWHERE = ("supervision.", "batch.", "session.", "operators.live.", "registration.", "cli.", "panels.keymap.")
 
 
 class Kept(Within):
