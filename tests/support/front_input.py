@@ -28,8 +28,9 @@ LONG = 0.02
 PLAIN = (bool, int, float, complex, str, bytes, np.ndarray, np.generic, Enum, type(None))
 # What is taken from a call is neither a number nor anything in it, but the argument itself.
 LEFT_OUT = "left out"
-# What works with processes, with Blender's window, and with what other calls have left.
-ELSEWHERE = ("supervision.", "batch.", "session.", "operators.live.", "registration.", "cli.", "panels.keymap.")
+# What works with processes, with Blender's data and window, with dates, and with what other calls have left.
+ELSEWHERE = ("supervision.", "batch.", "session.", "operators.live.", "registration.", "cli.", "panels.",
+             "operators.", "blender.", "files.fbx_nodes.")  # fmt: skip
 
 
 class Kept(Within):
