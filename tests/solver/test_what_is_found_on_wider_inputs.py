@@ -162,7 +162,7 @@ def _hold(table, here):
 def test_what_comes_of_other_input_is_that_of_the_table():
     calls = record().calls
     if ACCEPT == "1":
-        here = other_input.Asker().quick_rows(calls)
-        near = [other_input.Asker().rows_for(list(here), other.calls) for other in others()]
+        here = other_input.quick_rows(calls)
+        near = [other_input.rows_for(list(here), other.calls) for other in others()]
         CAME.write_text("".join(f"{line}\n" for line in recorded_calls.lines_of(here, near)))
-    _hold(CAME, other_input.Asker().rows_for(CAME.read_text().splitlines(), calls))
+    _hold(CAME, other_input.rows_for(CAME.read_text().splitlines(), calls))

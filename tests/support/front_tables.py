@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
-import front_input
 import numpy as np
 import recorded_calls
 import scenes
@@ -51,7 +50,7 @@ class Rounds:
 
         folder.mkdir()
         self.runs.prepare(folder, lambda *words: (run(*words),))
-        record = front_input.Kept(MOST)
+        record = recorded_calls.Within(MOST)
         with (
             recorded_calls.watching(record, recorded_calls.front_modules(), private=True),
             self.patch.context() as patch,
@@ -64,7 +63,6 @@ class Rounds:
                 record.add(name, left)
         # What was let be on its way is closed here, and not when Python ends.
         gc.collect()
-        self.calls = record.calls
         return record.figures
 
     def _told(self, folder: Path, run, patch) -> Iterator[tuple[str, object]]:
@@ -74,41 +72,25 @@ class Rounds:
             windows.in_single_steps(patch, self.package)
             yield from self.runs.in_a_window(folder)
 
-    def check(self, table: Path, folder: Path, came: Path | None = None) -> set[str]:
-        """Compare a round with a table, or write that anew, and what comes of its calls with other input with another
-        one: names of the functions that were called."""
-        rows, asker = self.figures(folder / "0"), front_input.FrontAsker()
-        calls = self.calls
+    def check(self, table: Path, folder: Path) -> set[str]:
+        """Compare a round with a table, or write that anew: names of the functions that were called."""
+        rows = self.figures(folder / "0")
         if ACCEPT == "1":
             others, add = [], scenes.add
             for seed in (1, 2, 3):
                 with self.patch.context() as patch:
                     patch.setattr(scenes, "add", _shaken(add, seed))
                     others.append(self.figures(folder / str(seed)))
-            _write(table, recorded_calls.lines_of(rows, others))
-        unlike = _unlike(table, rows)
-        if came is not None:
-            if ACCEPT in ("1", "came"):
-                here = asker.quick_rows(calls)
-                near = [asker.rows_for(list(here), front_input.shaken(calls, seed)) for seed in (1, 2)]
-                _write(came, recorded_calls.lines_of(here, near))
-            unlike += _unlike(came, asker.rows_for(came.read_text().splitlines(), calls))
-        assert not unlike, "\n".join([*unlike, "OMT_UV_ACCEPT=1 accepts this"])
+            found = [line for line in recorded_calls.lines_of(rows, others) if not line.startswith(ELSEWHERE)]
+            table.write_text("".join(f"{line}\n" for line in found))
+        lines = table.read_text().splitlines()
+        other = list(recorded_calls.unlike(lines, rows))
+        if ACCEPT == "fewer":
+            table.write_text("".join(f"{line}\n" for line in lines if line not in other))
+            other = []
+        now = [f"{line} is now {rows.get(line.split(chr(9))[0])}" for line in other]
+        assert not other, "\n".join([*now, "OMT_UV_ACCEPT=1 accepts this"])
         return {name.partition(" ")[0] for name in rows}
-
-
-def _write(table: Path, lines: Iterator[str]) -> None:
-    table.write_text("".join(f"{line}\n" for line in lines if not line.startswith(ELSEWHERE)))
-
-
-def _unlike(table: Path, rows: dict[str, np.ndarray]) -> list[str]:
-    """Lines of a table that are other now, and what they are; left out of the table where that is asked for."""
-    lines = table.read_text().splitlines()
-    other = list(recorded_calls.unlike(lines, rows))
-    if ACCEPT == "fewer":
-        table.write_text("".join(f"{line}\n" for line in lines if line not in other))
-        return []
-    return [f"{line} is now {rows.get(line.split(chr(9))[0])}" for line in other]
 
 
 def _shaken(add, seed):

@@ -41,14 +41,6 @@ LARGEST = 60_000
 # So far changes go into what objects hold, and so many items of a row of them are changed.
 DEEP = 2
 ITEMS = 2
-# Seconds of a call as it was, and of a row, of functions of the solver.
-SLOW = 0.01
-LONG = 0.015
-# Seconds after which a function never ends: while a table is written, and where those are known that do.
-HUNG = 2.5
-PATIENT = 120.0
-# Functions that are asked for in a process before the next one begins.
-BATCH = 60
 
 
 class Asked(Told):
@@ -86,32 +78,31 @@ def _inside(value) -> list[tuple[object, object]]:
     return list(vars(value).items()) if _is_ours(value) and hasattr(value, "__dict__") else []
 
 
-def places(value, depth: int = 0, changes: Callable | None = None) -> Iterator[tuple[tuple, str]]:
+def places(value, depth: int = 0) -> Iterator[tuple[tuple, str]]:
     """Ways to numbers in a value, each with the name of a change that may be made there."""
-    found = (changes or changes_of)(value)
-    for kind in found:
+    for kind in _changes(value):
         # How many there are of something, within an object, goes to functions in C that trust it.
-        if not depth or found is not WHOLE:
+        if not depth or _changes(value) is not WHOLE:
             yield (), kind
     if depth <= DEEP:
         for place, item in _inside(value):
-            for way, kind in places(item, depth + (depth > 0 or not isinstance(value, (tuple, dict))), changes):
+            for way, kind in places(item, depth + (depth > 0 or not isinstance(value, (tuple, dict)))):
                 yield (place, *way), kind
 
 
-def changed(value, way: tuple, kind: str, changes: Callable | None = None):
+def changed(value, way: tuple, kind: str):
     """A value with what stands at the end of a way changed; what is on the way is changed in place where it can be."""
     if not way:
-        return (changes or changes_of)(value)[kind](value)
+        return _changes(value)[kind](value)
     place, *rest = way
     if isinstance(value, tuple):
         items = list(value)
-        items[place] = changed(items[place], tuple(rest), kind, changes)
+        items[place] = changed(items[place], tuple(rest), kind)
         return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
     if isinstance(value, (list, dict)):
-        value[place] = changed(value[place], tuple(rest), kind, changes)
+        value[place] = changed(value[place], tuple(rest), kind)
     else:
-        object.__setattr__(value, place, changed(vars(value)[place], tuple(rest), kind, changes))
+        object.__setattr__(value, place, changed(vars(value)[place], tuple(rest), kind))
     return value
 
 
@@ -158,7 +149,7 @@ POINTS = {"waves": _waves, "negated": np.conj, "rolled": _rolled}
 MATRIX = {"waves": lambda a: a._with_data(_waves(a.data)) if hasattr(a, "_with_data") else a}
 
 
-def changes_of(value) -> dict[str, Callable]:
+def _changes(value) -> dict[str, Callable]:
     """Changes of a value by their names."""
     if isinstance(value, (bool, np.bool_)):
         return MARK
@@ -176,85 +167,29 @@ def changes_of(value) -> dict[str, Callable]:
     return {}
 
 
-class Asker:
-    """What is changed in calls, and how many changes of one are tried.
+def asked(call: Call) -> list[tuple[tuple, str]]:
+    """Ways and changes that are tried of a call."""
+    found = list(places((call.args, call.kwargs)))
+    if len(found) > MOST:
+        found = random.Random(zlib.crc32(call.name.encode())).sample(found, MOST)
+    return found
 
-    changes : of a value, its changes by their names; None: those of numbers, `changes_of`; slow, long : what takes
-    longer is not asked for while a table is written: seconds of a call as it was, and of a row
-    """
 
-    def __init__(
-        self, changes: Callable | None = None, most: int = MOST, slow: float = SLOW, long: float = LONG
-    ) -> None:
-        self.changes, self.most, self.slow, self.long = changes, most, slow, long
-
-    def asked(self, call: Call) -> list[tuple[tuple, str]]:
-        """Ways and changes that are tried of a call."""
-        found = self.ways(call)
-        if len(found) > self.most:
-            found = random.Random(zlib.crc32(call.name.encode())).sample(found, self.most)
-        return found
-
-    def ways(self, call: Call) -> list[tuple[tuple, str]]:
-        """All ways and changes that there are."""
-        return list(places((call.args, call.kwargs), changes=self.changes))
-
-    def given(self, call: Call, way: tuple, kind: str) -> tuple[tuple, dict]:
-        """What a call is given with a change, or with none."""
-        args, kwargs = copied((call.args, call.kwargs))
-        return changed((args, kwargs), way, kind, self.changes) if kind else (args, kwargs)
-
-    def outcome(self, call: Call, way: tuple = (), kind: str = "") -> np.ndarray:
-        """Figures (2,) of what comes of a call with a change, or with none."""
-        args, kwargs = self.given(call, way, kind)
-        try:
-            with np.errstate(all="ignore"), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                result = call.function(*args, **kwargs)
-                if inspect.isgenerator(result):
-                    result = _last(result)
-        except Exception as error:  # noqa: BLE001, which one it is counts
-            return figures(told_leaves(error, errors=True))
-        left = [result, args] if result is None else result
-        return figures(told_leaves(left)) + 0.1 * figures(told_leaves(recorded_calls.opened([left])))
-
-    def rows_of(self, name: str, calls: list[Call], kinds: set[str] | None = None) -> dict[str, np.ndarray]:
-        """Figures of all that comes of the calls of a function with changes, by its name and that of the change; of
-        some changes alone, if they are given."""
-        rows: dict[str, np.ndarray] = {}
-        for k, call in enumerate(calls):
-            for way, kind in self.asked(call):
-                if kinds is None or kind in kinds:
-                    key = f"{name}{CAME}{kind}"
-                    count = rows[key][0] if key in rows else 0.0
-                    own = np.array([1.0, *(self.outcome(call, way, kind) * (1 + 0.1 * count + 0.05 * k))])
-                    rows[key] = rows.get(key, np.zeros(3)) + own
-        return rows
-
-    def rows_for(self, lines: list[str], calls: dict[str, list[Call]]) -> dict[str, np.ndarray]:
-        """Rows of functions and changes that lines of a table have."""
-        kinds = kinds_in(lines)
-        return _in_other_processes(
-            sorted(kinds), lambda name: self.rows_of(name, calls.get(name, []), kinds[name]), PATIENT
-        )
-
-    def quick_rows(self, calls: dict[str, list[Call]]) -> dict[str, np.ndarray]:
-        """Rows of all calls that are kept but for those that take long, break off Python itself or never end."""
-        return _in_other_processes(sorted(calls), lambda name: self._quick_rows(name, calls[name]), HUNG)
-
-    def _quick_rows(self, name: str, calls: list[Call]) -> dict[str, np.ndarray]:
-        """Rows of a function that do not take long."""
-        rows: dict[str, np.ndarray] = {}
-        begin = os.times().user
-        for call in calls:
-            self.outcome(call)
-        if os.times().user - begin < self.slow * len(calls):
-            for kind in sorted({kind for call in calls for _, kind in self.asked(call)} - UNSOUND):
-                begin = os.times().user
-                found = self.rows_of(name, calls, {kind})
-                if os.times().user - begin < self.long:
-                    rows |= found
-        return rows
+def outcome(call: Call, way: tuple = (), kind: str = "") -> np.ndarray:
+    """Figures (2,) of what comes of a call with a change, or with none."""
+    args, kwargs = copied((call.args, call.kwargs))
+    if kind:
+        args, kwargs = changed((args, kwargs), way, kind)
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = call.function(*args, **kwargs)
+            if inspect.isgenerator(result):
+                result = _last(result)
+    except Exception as error:  # noqa: BLE001, which one it is counts
+        return figures(told_leaves(error, errors=True))
+    left = [result, args] if result is None else result
+    return figures(told_leaves(left)) + 0.1 * figures(told_leaves(recorded_calls.opened([left])))
 
 
 def _last(steps):
@@ -265,6 +200,20 @@ def _last(steps):
             return stop.value
 
 
+def rows_of(name: str, calls: list[Call], kinds: set[str] | None = None) -> dict[str, np.ndarray]:
+    """Figures of all that comes of the calls of a function with changes, by its name and that of the change; of some
+    changes alone, if they are given."""
+    rows: dict[str, np.ndarray] = {}
+    for k, call in enumerate(calls):
+        for way, kind in asked(call):
+            if kinds is None or kind in kinds:
+                key = f"{name}{CAME}{kind}"
+                count = rows[key][0] if key in rows else 0.0
+                own = np.array([1.0, *(outcome(call, way, kind) * (1 + 0.1 * count + 0.05 * k))])
+                rows[key] = rows.get(key, np.zeros(3)) + own
+    return rows
+
+
 def kinds_in(lines: list[str]) -> dict[str, set[str]]:
     """Changes that lines of a table have, by names of functions."""
     kinds: dict[str, set[str]] = {}
@@ -273,6 +222,42 @@ def kinds_in(lines: list[str]) -> dict[str, set[str]]:
         if came:
             kinds.setdefault(name, set()).add(kind)
     return kinds
+
+
+def rows_for(lines: list[str], calls: dict[str, list[Call]]) -> dict[str, np.ndarray]:
+    """Rows of functions and changes that lines of a table have."""
+    kinds = kinds_in(lines)
+    return _in_other_processes(sorted(kinds), lambda name: rows_of(name, calls.get(name, []), kinds[name]), PATIENT)
+
+
+def quick_rows(calls: dict[str, list[Call]]) -> dict[str, np.ndarray]:
+    """Rows of all calls that are kept but for those that take long, break off Python itself or never end."""
+    return _in_other_processes(sorted(calls), lambda name: _quick_rows(name, calls[name]), HUNG)
+
+
+# What takes longer is not asked for while a table is written: seconds of a call as it was, and of a row.
+SLOW = 0.01
+LONG = 0.015
+# Seconds after which a function never ends: while a table is written, and where those are known that do.
+HUNG = 2.5
+PATIENT = 120.0
+# Functions that are asked for in a process before the next one begins.
+BATCH = 60
+
+
+def _quick_rows(name: str, calls: list[Call]) -> dict[str, np.ndarray]:
+    """Rows of a function that do not take long."""
+    rows: dict[str, np.ndarray] = {}
+    begin = os.times().user
+    for call in calls:
+        outcome(call)
+    if os.times().user - begin < SLOW * len(calls):
+        for kind in sorted({kind for call in calls for _, kind in asked(call)} - UNSOUND):
+            begin = os.times().user
+            found = rows_of(name, calls, {kind})
+            if os.times().user - begin < LONG:
+                rows |= found
+    return rows
 
 
 def _in_other_processes(names: list[str], rows: Callable[[str], dict], seconds: float) -> dict[str, np.ndarray]:
