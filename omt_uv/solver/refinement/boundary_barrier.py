@@ -153,14 +153,18 @@ class _Near:
         return np.sqrt(size * rate) * (slide / size + turn / rate)
 
 
-def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float, reach: float = REACH) -> BoundaryBarrier:
+def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float, contact_reach: float = REACH) -> BoundaryBarrier:
     """A barrier for a boundary, see `loop_edges`, whose reach is that share of the edge lengths of the map w (n,)."""
     tail, head = loop_edges(loop)
     edge = np.abs(w[head] - w[tail])
     edge = np.minimum(edge, edge.mean())
     before = edge[edges_before(tail, head)]
     return BoundaryBarrier(
-        tail=tail, head=head, vertex_reach=reach * np.minimum(edge, before), edge_reach=reach * edge, strength=strength
+        tail=tail,
+        head=head,
+        vertex_reach=contact_reach * np.minimum(edge, before),
+        edge_reach=contact_reach * edge,
+        strength=strength,
     )
 
 

@@ -71,7 +71,7 @@ class MapProblem:
     loose : stages end on a looser promise, see `continuation_rules.stage_tolerances`
     symmetry : of the maps, or None
     count : of the polygons, where `faces` are those of one half, see `mirrored_motion.halved`
-    reach : of the barrier, see `boundary_barrier.make_barrier`
+    contact_reach : of the barrier, see `boundary_barrier.make_barrier`
     """
 
     faces: Elements
@@ -84,7 +84,7 @@ class MapProblem:
     symmetry: MirrorSymmetry | None = None
     count: int | None = None
     loose: bool = False
-    reach: float = REACH
+    contact_reach: float = REACH
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.
@@ -109,7 +109,7 @@ class MapProblem:
         if self.loop is None:
             raise ValueError("a boundary that may not move has nothing to be kept from")
         count = len(self.faces.area) if self.count is None else self.count
-        return make_barrier(w, self.loop, CONTACT_STRENGTH / count, self.reach)
+        return make_barrier(w, self.loop, CONTACT_STRENGTH / count, self.contact_reach)
 
     def boundary_crosses(self, w: np.ndarray) -> bool:
         """Whether the boundary of the map w (n,) crosses itself; never without a loop."""
@@ -232,7 +232,7 @@ def set_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResult) ->
     if step.any():
         moved = motion.move(stage.w, np.where(motion.free.all(axis=1), step / motion.frame(stage.w), 0))
         if np.isfinite(newton.energy(moved)) and not problem.boundary_crosses(moved):
-            return replace(problem, reach=CLOSE_REACH), moved
+            return replace(problem, contact_reach=CLOSE_REACH), moved
     return problem, as_far_as_apart(problem, newton, stage)
 
 

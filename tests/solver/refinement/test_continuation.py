@@ -287,10 +287,14 @@ def test_what_would_fold_or_cross_is_not_set_apart():
     stage = drain(minimise(newton, w, StageLimits(0.0, 50), 0, problem.boundary_crosses))
     assert stage.status == "crossed"
     closer, moved = set_apart(problem, newton, stage)
-    assert closer.reach == CLOSE_REACH and np.abs(moved - stage.w).max() > 0 and not problem.boundary_crosses(moved)
+    assert (
+        closer.contact_reach == CLOSE_REACH
+        and np.abs(moved - stage.w).max() > 0
+        and not problem.boundary_crosses(moved)
+    )
     folded = SimpleNamespace(energy=lambda w: np.inf)
     same, near = set_apart(problem, folded, stage)
-    assert same.reach == REACH and np.array_equal(near, stage.w)
+    assert same.contact_reach == REACH and np.array_equal(near, stage.w)
     # What does not touch goes most of the way to there, as ever.
     V, F, w = ramp(1.3)
     problem, _ = problem_of(V, F)
