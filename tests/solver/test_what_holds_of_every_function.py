@@ -386,10 +386,4 @@ def test_what_is_found_is_that_of_the_table():
     if ACCEPT:
         lines = recorded_calls.lines_of(rows, [shaken(seed).told for seed in (1, 2, 3)])
         FOUND.write_text("".join(f"{line}\n" for line in lines))
-    told = FOUND.read_text().splitlines()
-    other = list(recorded_calls.unlike(told, rows))
-    if FEWER:
-        FOUND.write_text("".join(f"{line}\n" for line in told if line not in other))
-        return
-    now = [f"{line} is now {rows.get(line.split(chr(9))[0])}" for line in other]
-    assert not other, "\n".join([*now, "OMT_UV_ACCEPT=1 accepts this"])
+    recorded_calls.hold(FOUND, rows)

@@ -9,6 +9,7 @@ import functools
 import importlib
 import inspect
 import itertools
+import os
 import pkgutil
 import re
 from collections.abc import Callable, Generator, Iterator
@@ -365,6 +366,17 @@ def unlike(lines: list[str], rows: dict[str, np.ndarray]) -> Iterator[str]:
         name, exact, *values = line.split("\t")
         if name not in rows or apart(rows[name], np.array(values, float)) > float(exact) + EXACT:
             yield line
+
+
+def hold(table: Path, rows: dict[str, np.ndarray]) -> None:
+    """Rows are those of a table; with OMT_UV_ACCEPT=fewer those that are not are left out of it."""
+    lines = table.read_text().splitlines()
+    other = list(unlike(lines, rows))
+    if os.environ.get("OMT_UV_ACCEPT") == "fewer":
+        table.write_text("".join(f"{line}\n" for line in lines if line not in other))
+        return
+    now = [f"{line} is now {rows.get(line.split(chr(9))[0])}" for line in other]
+    assert not other, "\n".join([*now, "OMT_UV_ACCEPT=1 accepts this"])
 
 
 def _listened(record: Record, call: Call | None, steps: Generator) -> Generator:

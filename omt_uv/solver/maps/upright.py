@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.charts import Chart
-from ..mesh.geometry import cross3, dot3, part_by_part, signed_areas, unit
+from ..mesh.geometry import cross3, dot3, face_normals, part_by_part, signed_areas
 from ..mesh.topology import halfedges, pair_keys, pair_up
 
 # Directions of edges, up to quarter turns, are counted in so many bins of half a degree.
@@ -124,21 +124,17 @@ def _edge_directions(islands: _Islands) -> tuple[np.ndarray, np.ndarray]:
     outline[first] = outline[second] = False
     side = outline.copy()
     side[first] = face[first] != face[second]
-    creased = outline.copy()
-    creased[first] = _fold(islands, first // 3, second // 3) > CREASE
-    found = [_main_direction(islands, tail, head, x) for x in (side, outline, creased)]
-    (share, direction), (straight, along), (folded, crease) = found
+    (share, direction), (straight, along) = (_main_direction(islands, tail, head, x) for x in (side, outline))
     own = straight >= np.minimum(np.maximum(share, DOMINANT), STRAIGHT)
     share, direction = np.where(own, straight, share), np.where(own, along, direction)
-    bent = (share < DOMINANT) & (folded >= CREASED)
+    askew = share < DOMINANT
+    if not askew.any():
+        return share, direction
+    normal, creased = face_normals(islands.points, islands.triangles), outline.copy()
+    creased[first] = dot3(normal[first // 3], normal[second // 3]) < np.cos(CREASE)
+    folded, crease = _main_direction(islands, tail, head, creased)
+    bent = askew & (folded >= CREASED)
     return np.where(bent, DOMINANT, share), np.where(bent, crease, direction)
-
-
-def _fold(islands: _Islands, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Angle (e,) in space between triangles one and other (e,)."""
-    a, b, c = np.moveaxis(islands.points[islands.triangles], 1, 0)
-    normal = unit(cross3(b - a, c - a))
-    return np.arccos(np.clip(dot3(normal[one], normal[other]), -1, 1))
 
 
 def _main_direction(islands: _Islands, tail, head, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
