@@ -148,11 +148,14 @@ def is_marked(surface: Surface, chart: Chart) -> bool:
 
 
 def identity(chart: Chart) -> tuple[bytes, bytes]:
-    """Equal for charts of the same corners that are joined in the same way, whatever the order of their vertices and
-    triangles, but for those with patches."""
-    corners, triangles = in_order_of_corners(chart)
+    """Equal for charts of the same corners and patches that are joined in the same way, whatever the order of their
+    vertices and triangles."""
     if len(chart.patches):
-        return corners.tobytes(), np.concatenate([triangles, chart.patches]).astype(np.int64).tobytes()
+        # What fills holes has no corners to go by.
+        placed, _ = in_order_of_places(chart)
+        parts = placed.triangles, placed.patches
+        return placed.corners.astype(np.int64).tobytes(), np.concatenate(parts).astype(np.int64).tobytes()
+    corners, triangles = in_order_of_corners(chart)
     _, first, number = np.unique(triangles, return_index=True, return_inverse=True)
     return corners.tobytes(), first[number.ravel()].tobytes()
 

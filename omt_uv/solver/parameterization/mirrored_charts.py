@@ -25,7 +25,7 @@ from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import boundary_loops, distinct, graph_components, on_boundary, pair_keys
 from ..progress import Steps
 from ..refinement.initial_maps import is_curved, unroll
-from .chart_indices import ChartPins, identity, in_order_of_corners
+from .chart_indices import ChartPins, identity, in_order_of_corners, in_order_of_places
 from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
 from .convex_maps import with_figures
 from .options import MapOptions
@@ -339,9 +339,26 @@ def mapped_anew(
     ]
 
 
+def with_known_maps(
+    map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
+) -> Callable[[list[Chart]], Steps[list[ChartMap]]]:
+    """What maps charts, which gives for one that is as another was the map of that: see `mapped_anew`."""
+    known: list[tuple[Chart, ChartMap]] = []
+
+    def again(charts: list[Chart]) -> Steps[list[ChartMap]]:
+        maps = yield from mapped_anew(charts, known, map_charts)
+        known.extend(zip(charts, maps, strict=True))
+        return maps
+
+    return again
+
+
 def _numbered_as(chart: Chart, other: Chart, chart_map: ChartMap) -> ChartMap:
     """The map of another chart for one that is the same, but for the order of its vertices and triangles."""
-    here, there = in_order_of_corners(chart)[1], in_order_of_corners(other)[1]
+    if len(chart.patches):
+        here, there = in_order_of_places(chart)[1], in_order_of_places(other)[1]
+    else:
+        here, there = in_order_of_corners(chart)[1], in_order_of_corners(other)[1]
     if np.array_equal(here, there):
         return chart_map
     uv = np.zeros_like(chart_map.uv)

@@ -45,6 +45,7 @@ from .mirrored_charts import (
     mirrored_map,
     remembered,
     with_images,
+    with_known_maps,
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
@@ -370,7 +371,7 @@ class _Task:
         """Maps charts with areas that are as exact as Standard promises and no more; None for other qualities."""
         if self.options.quality != "standard" or self.options.balance > 0:
             return None
-        return replace(self, options=replace(self.options, quality="promised")).map_charts
+        return with_known_maps(replace(self, options=replace(self.options, quality="promised")).map_charts)
 
     def map_symmetric(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""

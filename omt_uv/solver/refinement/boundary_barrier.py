@@ -22,8 +22,8 @@ REACH = 0.5
 # A step goes at most this share of the way to the first contact.
 CONTACT_SHARE = 0.8
 # What is nearer than this share of the reach is set apart by as much before a barrier stands between: nets lie edge to
-# edge, where it is infinite, and what has no way to go is not held back either. Its reach is less there, lest slits
-# through flat sides open.
+# edge, where it is infinite, and what has no way to go is not held back either. Its reach is less there and there
+# alone, lest slits through flat sides open: the less it reaches, the more steps go past it.
 APART = 0.1
 CLOSE_REACH = 0.05
 
@@ -153,17 +153,21 @@ class _Near:
         return np.sqrt(size * rate) * (slide / size + turn / rate)
 
 
-def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float, contact_reach: float = REACH) -> BoundaryBarrier:
-    """A barrier for a boundary, see `loop_edges`, whose reach is that share of the edge lengths of the map w (n,)."""
+def make_barrier(
+    w: np.ndarray, loop: np.ndarray, strength: float, contact_reach: float | np.ndarray = REACH
+) -> BoundaryBarrier:
+    """A barrier for a boundary, see `loop_edges`, whose reach is that share, of all or of each vertex (n,), of the edge
+    lengths of the map w (n,)."""
     tail, head = loop_edges(loop)
+    reach = np.broadcast_to(contact_reach, len(w))
     edge = np.abs(w[head] - w[tail])
     edge = np.minimum(edge, edge.mean())
     before = edge[edges_before(tail, head)]
     return BoundaryBarrier(
         tail=tail,
         head=head,
-        vertex_reach=contact_reach * np.minimum(edge, before),
-        edge_reach=contact_reach * edge,
+        vertex_reach=reach[tail] * np.minimum(edge, before),
+        edge_reach=np.minimum(reach[tail], reach[head]) * edge,
         strength=strength,
     )
 

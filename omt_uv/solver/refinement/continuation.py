@@ -71,7 +71,7 @@ class MapProblem:
     loose : stages end on a looser promise, see `continuation_rules.stage_tolerances`
     symmetry : of the maps, or None
     count : of the polygons, where `faces` are those of one half, see `mirrored_motion.halved`
-    contact_reach : of the barrier, see `boundary_barrier.make_barrier`
+    contact_reach : of the barrier, of all or of each vertex (n,), see `boundary_barrier.make_barrier`
     """
 
     faces: Elements
@@ -84,7 +84,7 @@ class MapProblem:
     symmetry: MirrorSymmetry | None = None
     count: int | None = None
     loose: bool = False
-    contact_reach: float = REACH
+    contact_reach: float | np.ndarray = REACH
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.
@@ -227,12 +227,12 @@ def as_far_as_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResu
 def set_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResult) -> tuple[MapProblem, np.ndarray]:
     """The problem for what goes on with a barrier after a stage that ended "crossed", and the map (n,) complex to go on
     from: `as_far_as_apart`, or where the boundary touches itself, as that of a net does, the map with these a little
-    apart, and a barrier that reaches no farther than it has to."""
+    apart, and a barrier that reaches no farther than it has to there."""
     step, motion = problem.barrier(stage.w).set_apart(stage.w), problem.motion
     if step.any():
         moved = motion.move(stage.w, np.where(motion.free.all(axis=1), step / motion.frame(stage.w), 0))
         if np.isfinite(newton.energy(moved)) and not problem.boundary_crosses(moved):
-            return replace(problem, contact_reach=CLOSE_REACH), moved
+            return replace(problem, contact_reach=np.where(step == 0, REACH, CLOSE_REACH)), moved
     return problem, as_far_as_apart(problem, newton, stage)
 
 

@@ -1053,13 +1053,32 @@ def test_charts_that_are_as_before_keep_their_maps():
     assert asked == [new]
 
 
-def test_charts_that_are_as_before_but_for_the_order_of_their_vertices_and_triangles_keep_their_maps():
+def test_what_maps_charts_is_asked_for_each_but_once():
     V, F = meshes.grid(2, 2)
+    one, other, asked = chart_of(V, F), chart_of(V, F[:4]), []
+
+    def map_charts(charts):
+        asked.append(len(charts))
+        return [len(chart.triangles) for chart in charts]
+        yield
+
+    again = mirrored_charts.with_known_maps(map_charts)
+    assert [drain(again(charts)) for charts in ([one], [other, one], [other])] == [[8], [4, 8], [4]]
+    assert asked == [1, 1, 0]
+
+
+@pytest.mark.parametrize("hole", [0, 2])
+def test_charts_that_are_as_before_but_for_the_order_of_their_vertices_and_triangles_keep_their_maps(hole):
+    V, F = meshes.grid(3, 3)
+    V = V + 0.01 * np.random.default_rng(1).normal(size=V.shape)
+    F, patches = F[np.r_[:8, 8 + hole : len(F)]], filled(V, F[8 : 8 + hole])
+    V = np.concatenate([V, [[0.5, 0.4, 0.1]]]) if hole else V
     rng = np.random.default_rng(0)
     order, rows = rng.permutation(len(V)), rng.permutation(len(F))
-    place, known = np.argsort(order), chart_of(V, F)
+    place, known = np.argsort(order), replace(chart_of(V, F), patches=patches)
     turned = np.roll(np.stack([place[F], known.corners])[:, rows], 1, axis=2).astype(np.int32)
     new = replace(known, vertices=V[order], triangles=turned[0], corners=turned[1], faces=known.faces[rows])
+    new = replace(new, patches=np.roll(place[patches], 1, axis=1)[::-1])
     chart_map = ChartMap(uv=V[:, :2] + 0.5, area_l1=0.0, area_sd=0.0, angle_mean=1.0, folds=0)
 
     def map_charts(charts):
@@ -1069,6 +1088,21 @@ def test_charts_that_are_as_before_but_for_the_order_of_their_vertices_and_trian
 
     (found,) = drain(mirrored_charts.mapped_anew([new], [(known, chart_map)], map_charts))
     np.testing.assert_array_equal(found.uv, new.vertices[:, :2] + 0.5)
+
+
+def filled(V, hole):
+    """A fan around the next vertex over the hole of two triangles that are a quad."""
+    loop = boundary_loops(hole)[0] if len(hole) else np.zeros(0, np.int64)
+    return np.column_stack([loop, np.roll(loop, -1), np.full(len(loop), len(V))]).astype(np.int64)
+
+
+def test_charts_with_another_patch_are_not_as_before():
+    V, F = meshes.grid(3, 3)
+    known = replace(chart_of(V, F[np.r_[:8, 10 : len(F)]]), patches=F[8:10])
+    more = {"vertices": np.concatenate([V, [[0.5, 0.4, 0.1]]]), "vertex_ids": np.append(known.vertex_ids, -1)}
+    fan = replace(known, patches=filled(V, F[8:10]), **more)
+    names = [mirrored_charts.identity(one) for one in (known, replace(known, patches=F[8:9]), fan)]
+    assert len(set(names)) == 3
 
 
 # Polygons cut for maps.
