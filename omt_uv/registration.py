@@ -47,7 +47,7 @@ from .panels.preferences import OMTUVPreferences, apply_soon
 from .panels.sidebar import PANELS
 from .panels.tools import UV_UL_omt_regions
 from .panels.translations.registered import tables_of
-from .session import last_run, queue
+from .session import ahead, last_run, queue
 from .session.presets import register_folder, unregister_folder
 from .session.region_list import OMTUVRegion, OMTUVRegionList, register_list, unregister_list
 
@@ -150,6 +150,7 @@ def _clear(_) -> None:
     colour_bar.forget()
     last_run.forget()
     queue.forget()
+    ahead.forget()
     unregister_folder()
 
 

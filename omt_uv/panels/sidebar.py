@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 
 from .. import links
+from ..session import ahead
 from ..settings import CONTEXT
 from . import arrange, inspect, match, partition, result, tools, unwrap, volumes
 from .section import Section, class_of
@@ -65,7 +66,11 @@ class TabPanel:
 
 
 class MainPanel(TabPanel):
-    """The first section, with presets in its header."""
+    """The first section, with presets in its header. Whoever sees it may click soon."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        ahead.begin()
+        TabPanel.draw(self, context)
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
         self.layout.emboss = "NONE"
