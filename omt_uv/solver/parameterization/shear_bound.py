@@ -47,8 +47,8 @@ LARGE_PART = 0.03
 SHORTER_PART = 0.9
 # Of charts with more vertices cuts are straight, but for what the search has no eye for.
 IN_STEPS = 10000
-# Straighter ones leave at most so many times the log(shear) of those before, where that was no more than this: sides
-# that lie flat are to stay so.
+# Straighter and shorter ones leave at most so many times the log(shear) of those before, where that was no more than
+# this: sides that lie flat are to stay so.
 AS_SHEARED = 1.2
 NEARLY_FLAT = 1.1
 # Charts that shear more come apart around flat sides, where that leaves no more than this share of log(shear).
@@ -349,7 +349,7 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     missed = np.bincount(of, new.pressing > new.bound, count) > 0
     sprawls = np.bincount(of, new.extent > np.maximum(last.extent[of], COMPACT * np.sqrt(last.area.sum())), count) > 0
     # The outline of a part is there before and after.
-    stay = missed | sprawls | (np.bincount(of, new.outline_length, count) > SHORTER_PART * last.outline_length)
+    stay = missed | sprawls | ~_as_flat(last, new, of) | (np.bincount(of, new.outline_length, count) > SHORTER_PART * last.outline_length)
     return last if stay.all() else last.merged(search, new, of, stay)
 
 
@@ -376,13 +376,18 @@ def _straightened(search: ShearSearch, last: Round, map_charts, early: EarlyEnd)
     from ..seams.growth import EVEN
 
     of, count = last.chart_of(search, new), len(last.charts)
-    # Another cut may come apart, along folds, or miss the bound, or do without what keeps flat sides flat; and of two
-    # alike rounding does not choose.
+    # Another cut may come apart, along folds, or miss the bound; and of two alike rounding does not choose.
     good = (np.bincount(of, minlength=count) == 1) & (np.bincount(of, new.pressing > new.bound, count) == 0)
-    as_flat = np.bincount(of, new.area * np.log(new.mean), count) <= AS_SHEARED * last.area * np.log(last.mean)
-    good &= as_flat | (last.mean > NEARLY_FLAT)
+    good &= _as_flat(last, new, of)
     stay = ~(good & (np.bincount(of, new.outline_price, count) < (1 - EVEN) * last.outline_price))
     return last if stay.all() else last.merged(search, new, of, stay)
+
+
+def _as_flat(last: Round, new: Round, of: np.ndarray) -> np.ndarray:
+    """Charts (k,) bool of a round that, cut otherwise in a new one, whose charts came of them (m,), do not do without
+    what keeps flat sides flat."""
+    sheared = np.bincount(of, new.area * np.log(new.mean), len(last.charts))
+    return (sheared <= AS_SHEARED * last.area * np.log(last.mean)) | (last.mean > NEARLY_FLAT)
 
 
 def _result(last: Round, search: ShearSearch, warnings: tuple[str, ...], early: EarlyEnd) -> BoundedShear:

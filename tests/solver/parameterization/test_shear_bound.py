@@ -390,7 +390,11 @@ def test_parts_of_what_came_apart_have_cuts_of_their_own_where_these_are_shorter
     after = drain(shear_bound._parts_cut_anew(search, before, map_charts, shear_bound.EarlyEnd()))
     assert after.cuts.length < 0.9 * before.cuts.length and (after.pressing <= 1.3).all() and len(after.charts) == 2
     assert {frozenset(e) for e in seam.tolist()} <= {frozenset(e) for e in after.cuts.edges.tolist()}
-    # Parts whose own cuts are no shorter, and what is in one piece, stay as they are.
+    # Parts that lay nearly flat, or whose own cuts are no shorter, stay as they are.
+    flat = replace(before, mean=np.array([1.05, before.mean[1]]))
+    partly = drain(shear_bound._parts_cut_anew(search, flat, map_charts, shear_bound.EarlyEnd()))
+    inner = [np.isin(pair_keys(*one.cuts.edges.T), within(before.charts[0])).sum() for one in (before, partly, after)]
+    assert inner[0] == inner[1] > inner[2] and partly.cuts.length < before.cuts.length
     assert drain(shear_bound._parts_cut_anew(search, after, map_charts, shear_bound.EarlyEnd())) is after
 
 
