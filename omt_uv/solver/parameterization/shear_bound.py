@@ -349,7 +349,8 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     missed = np.bincount(of, new.pressing > new.bound, count) > 0
     sprawls = np.bincount(of, new.extent > np.maximum(last.extent[of], COMPACT * np.sqrt(last.area.sum())), count) > 0
     # The outline of a part is there before and after.
-    stay = missed | sprawls | ~_as_flat(last, new, of) | (np.bincount(of, new.outline_length, count) > SHORTER_PART * last.outline_length)
+    longer = np.bincount(of, new.outline_length, count) > SHORTER_PART * last.outline_length
+    stay = missed | sprawls | longer | ~_as_flat(last, new, of)
     return last if stay.all() else last.merged(search, new, of, stay)
 
 
