@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.feature_edges import fold_angles
 from ..analysis.seam_costs import SeamCosts
 from ..errors import plural
 from ..mesh.geometry import face_areas, face_normals, lengths, unit
@@ -29,6 +30,13 @@ MANY = 32
 LEVEL = 0.95
 FLAT = 1e-3
 SMALL = 0.04
+# A side is large with this share of the area of its component, and folds nowhere by more than that.
+LARGE_SIDE = 0.02
+PLANE = np.radians(1)
+# A hole lies in a bevel beside a side where it is no farther from that than this share of its radius, and its normal
+# nearer to that of the side than this cosine, which normals of the bevel are not.
+BEVEL = 0.3
+PARALLEL = 0.98
 # Boundaries of a sieve that are so many times as long as most are no holes, but outer boundaries; at most MANY.
 OUTSTANDING = 3.0
 # Holes in a face are eyes, nostrils and throats, if they are no longer around than the first share of the root of the
@@ -80,7 +88,8 @@ def fill_holes(
 
 
 def level_parts(gluing: Gluing, positions: np.ndarray) -> np.ndarray:
-    """Triangles (m,) bool of components that look one way but do not quite unroll: their holes need no cut.
+    """Triangles (m,) bool of components that look one way but do not quite unroll, and of others that do not those at
+    holes in flat sides: they need no cut.
 
     Cuts to the holes of what unrolls close again in its map.
     """
@@ -89,7 +98,65 @@ def level_parts(gluing: Gluing, positions: np.ndarray) -> np.ndarray:
     vector = area[:, None] * face_normals(positions, triangles)
     whole = np.linalg.norm(np.stack([np.bincount(component_of, x) for x in vector.T]), axis=0)
     curvature = total_curvature(gluing, corner_classes(gluing), component_of, positions)
-    return ((whole >= LEVEL * np.bincount(component_of, area)) & (curvature > FLAT))[component_of]
+    level = (whole >= LEVEL * np.bincount(component_of, area))[component_of]
+    boundary, loop = _boundaries(gluing, np.zeros(len(triangles), dtype=bool))
+    if len(boundary):
+        bevelled = _in_bevels(gluing, positions, boundary, loop, curvature > FLAT)
+        level[boundary[bevelled[loop]] // 3] = True
+    return level & (curvature > FLAT)[component_of]
+
+
+def _in_bevels(
+    gluing: Gluing, positions: np.ndarray, boundary: np.ndarray, loop: np.ndarray, among: np.ndarray
+) -> np.ndarray:
+    """Loops (l,) bool of boundary halfedges (r,) in a bevel beside a large flat side of their component, of those
+    `among` (k,) bool that have several. Where a hole has no bevel, nothing else may have one: cuts to it close again.
+    """
+    component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
+    at = component_of[boundary[np.unique(loop, return_index=True)[1]] // 3]
+    among = among & (np.bincount(at, minlength=len(among)) > 1)
+    if not among.any():
+        return np.zeros(len(at), dtype=bool)
+    pair = np.stack([gluing.first, gluing.second], axis=1)
+    side = components(gluing.without(np.abs(fold_angles(positions, triangles, pair)) > PLANE))
+    area, first = face_areas(positions, triangles), np.unique(side, return_index=True)[1]
+    size, own = np.bincount(side, area), component_of[first]
+    large = np.flatnonzero(among[own] & (size >= LARGE_SIDE * np.bincount(component_of, area)[own]))
+    middle = np.stack([np.bincount(side, area * x) for x in positions[triangles].mean(axis=1).T], axis=1)
+    normal = face_normals(positions, triangles[first[large]])
+    loops = _loops_of(positions, *gluing.ends(boundary), loop)
+    apart = loops.centre[:, None] - middle[large] / size[large, None]
+    within = np.abs((apart * normal).sum(axis=2)) <= BEVEL * loops.radius[:, None]
+    within &= np.abs(loops.normal @ normal.T) >= PARALLEL
+    steep = face_normals(positions, triangles[boundary // 3])
+    bevelled = np.stack([np.bincount(loop, x) for x in steep.T], axis=1) / np.bincount(loop)[:, None]
+    within &= np.abs(bevelled @ normal.T) < PARALLEL
+    return (within & (at[:, None] == own[large])).any(axis=1)
+
+
+@dataclass(frozen=True)
+class _Loops:
+    """Centres (l,3) of loops, mean radii (l,), and normals (l,3), which are shorter than 1 where a loop is not flat."""
+
+    centre: np.ndarray
+    radius: np.ndarray
+    normal: np.ndarray
+
+
+def _loops_of(positions: np.ndarray, a: np.ndarray, b: np.ndarray, loop: np.ndarray) -> _Loops:
+    """What the loops (r,) of sides go around, from vertices a (r,) to b (r,)."""
+
+    def sums(of: np.ndarray) -> np.ndarray:
+        return np.stack([np.bincount(loop, x) for x in of.T], axis=1)
+
+    centre = sums(positions[a]) / np.bincount(loop)[:, None]
+    out = positions[a] - centre[loop]
+    normal = np.cross(out, positions[b] - centre[loop])
+    return _Loops(
+        centre=centre,
+        radius=np.bincount(loop, lengths(out)) / np.bincount(loop),
+        normal=sums(normal) / np.maximum(np.bincount(loop, lengths(normal)), 1e-300)[:, None],
+    )
 
 
 def sieved(holes: int) -> str:
@@ -214,7 +281,8 @@ def _holes(
             size = np.bincount(component_at, face_areas(positions, gluing.vertex[gluing.triangles]))
             # A disk inside such a loop is no more than that.
             small = (2 * around) ** 2 <= 4 * np.pi * SMALL * size[component_of]
-            hole |= inner & small & whole[first_of // 3]
+            bevelled = _in_bevels(gluing, positions, boundary, loop, np.ones(len(size), dtype=bool))
+            hole |= inner & (small | bevelled) & whole[first_of // 3]
     return hole
 
 

@@ -13,7 +13,7 @@ from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.analysis.seam_costs import SeamPreferences
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
-from omt_uv.solver.cutting.hole_filling import MANY, NO_POLYGON, fill_holes, hole_boundaries
+from omt_uv.solver.cutting.hole_filling import MANY, NO_POLYGON, fill_holes, hole_boundaries, level_parts
 from omt_uv.solver.errors import NotADiskError
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -402,3 +402,33 @@ def test_what_is_long_is_a_hole_where_there_are_too_many_for_outer_boundaries(lo
     F = F[~gone]
     found = fill_holes(triangle_surface(V, F), gluing_of(V, F), np.zeros(len(F), bool), sieve=8)
     assert found.holes == filled
+
+
+def folded_plate(depth, n=16):
+    """A plate folded up along its middle by a right angle, with two square holes: the first as deep bevelled."""
+    holes = [lambda i, j: (abs(i - 3) <= 1) & (abs(j - 4) <= 1), lambda i, j: (abs(i - 12) <= 1) & (abs(j - 11) <= 1)]
+    p, F = punched(n, n, lambda i, j: holes[0](i, j) | holes[1](i, j))
+    x, y = n * p.T
+    bevel = depth * ((np.maximum(abs(x - 3.5), abs(y - 4.5)) < 2) & (abs(x - 3.5) < 2))
+    V = np.column_stack([np.minimum(x, n / 2), y, np.maximum(x - n / 2, 0) - bevel])
+    return V, F, np.flatnonzero(bevel[F].any(axis=1)) if depth else np.zeros(0, int)
+
+
+@pytest.mark.parametrize("depth, level", [(0.3, True), (0.9, False), (0.0, False)])
+def test_holes_in_bevels_beside_flat_sides_need_no_cut(depth, level):
+    V, F, around = folded_plate(depth)
+    gluing = gluing_of(V, F)
+    found = level_parts(gluing, V)
+    boundary, loop = hole_boundaries(V, gluing, np.zeros(len(F), bool), MANY, found)
+    assert len(np.unique(loop)) == level and found.any() == level
+    assert np.isin(np.flatnonzero(found), around).all() and np.isin(boundary // 3, around).all()
+    # Wherever it lies, and on a part that is cut in two.
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    np.testing.assert_array_equal(level_parts(gluing, 3 * V @ turn + 5), found)
+    two = gluing_of(np.concatenate([V, V + 50]), np.concatenate([F, F + len(V)]))
+    np.testing.assert_array_equal(level_parts(two, np.concatenate([V, V + 50])), np.tile(found, 2))
+
+
+def test_open_ends_of_tubes_are_no_holes_in_sides():
+    V, F = tube(4, 12, lambda i, j: np.zeros(len(i), bool), bulge=0.2)
+    assert not level_parts(gluing_of(V, F), V).any()

@@ -204,7 +204,7 @@ def test_a_body_with_legs_has_shorter_seams_and_keeps_the_bound(monkeypatch):
     """Nothing of it is lost, and what shears less than it may without joints shears more with them."""
     rng = np.random.default_rng(4)
     V, F = bodies.icosphere(3)
-    out = rng.normal(size=(3, 3))
+    out = rng.normal(size=(4, 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     surface = triangle_surface(V * (1 + 3.5 * np.exp(12 * (V @ out.T - 1)).max(axis=1, keepdims=True)), F)
     found = []

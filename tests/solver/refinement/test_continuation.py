@@ -287,11 +287,15 @@ def test_what_would_fold_or_cross_is_not_set_apart():
     stage = drain(minimise(newton, w, StageLimits(0.0, 50), 0, problem.boundary_crosses))
     assert stage.status == "crossed"
     closer, moved = set_apart(problem, newton, stage)
-    assert (
-        closer.contact_reach == CLOSE_REACH
-        and np.abs(moved - stage.w).max() > 0
-        and not problem.boundary_crosses(moved)
-    )
+    # Only what touched is nearer to each other than a barrier elsewhere lets it be.
+    touching = moved != stage.w
+    assert touching.any() and not problem.boundary_crosses(moved)
+    np.testing.assert_array_equal(closer.contact_reach, np.where(touching, CLOSE_REACH, REACH))
+    barrier = closer.barrier(moved)
+    edge = np.abs(np.diff(moved[np.stack([barrier.tail, barrier.head])], axis=0))[0]
+    far = ~touching[barrier.tail] & ~touching[barrier.head]
+    assert far.any() and (barrier.edge_reach <= np.where(far, REACH, CLOSE_REACH) * edge * (1 + 1e-12)).all()
+    assert (barrier.edge_reach[far] > CLOSE_REACH * edge[far]).all()
     folded = SimpleNamespace(energy=lambda w: np.inf)
     same, near = set_apart(problem, folded, stage)
     assert same.contact_reach == REACH and np.array_equal(near, stage.w)
