@@ -6,6 +6,7 @@ wheels; that is how scripts/release/matrix.py tests every Blender version.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import sys
@@ -16,6 +17,8 @@ import pytest
 ADDON = "bl_ext.user_default.omt_uv"
 FOLDERS = ("blender", "commands", "display", "extension", "operators", "panels", "session")
 STATUS = pytest.StashKey[int]()
+# Where Linux lists what a process holds open.
+TOLD_OPEN = Path("/proc/self/fd")
 
 
 def needs_blender(path: Path) -> bool:
@@ -80,6 +83,26 @@ def registered(request):
     """OMT UV is registered wherever Blender is tested, and only there."""
     if needs_blender(request.path):
         request.getfixturevalue("package")
+
+
+def opened_in(folder: Path) -> list[str]:
+    """Files in a folder, and folders, that this process holds open; none where the system does not tell."""
+    found = []
+    for number in os.listdir(TOLD_OPEN) if TOLD_OPEN.is_dir() else ():
+        # That by which the list was read is closed by now.
+        with contextlib.suppress(OSError):
+            path = os.readlink(TOLD_OPEN / number)
+            found += [path] if path.startswith(f"{folder}/") or path == str(folder) else []
+    return found
+
+
+@pytest.fixture(autouse=True)
+def closed_files(request):
+    """Whatever a test does with files in a folder of its own, it leaves none of them open."""
+    yield
+    folder = request.node.funcargs.get("tmp_path")
+    still = opened_in(folder.resolve()) if folder is not None else []
+    assert not still, f"still open: {still}"
 
 
 @pytest.fixture(autouse=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from kept import check, plain
 
 TABLE = Path(__file__).with_name("interface.tsv")
+HELPS = Path(__file__).with_name("helps.tsv")
 
 
 def rows(name, command):
@@ -24,3 +25,19 @@ def rows(name, command):
 def test_options_are_those_of_the_table(package):
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
     check(TABLE, [row for name in sorted(every.choices) for row in rows(name, every.choices[name])])
+
+
+def test_help_is_that_of_the_table(package):
+    """What is told of every command and of each of its options, with numbers put in."""
+    (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
+    told = {action.dest: action.help for action in every._choices_actions}
+    lines = []
+    for name in sorted(every.choices):
+        command = every.choices[name]
+        lines.append("\t".join([name, "", "", " ".join(f"{told.get(name)} | {command.epilog or ''}".split())]))
+        formatter = command._get_formatter()
+        for action in command._actions:
+            flags = " ".join(action.option_strings) or action.dest
+            help = formatter._expand_help(action) if action.help else ""
+            lines.append("\t".join([name, flags, "", " ".join(help.split())]))
+    check(HELPS, lines)

@@ -89,6 +89,24 @@ def test_what_a_handle_does_not_have_is_named_with_its_number(key, known, tmp_pa
         module.read_handle_file(path)
 
 
+KEEPS = [("feet", ("feet",)), (["feet"], ("feet",)), ([], ()), ("", ("",)),
+         (["feet", "hands"], "names 2 vertex groups"), (3, "not the name of a vertex group"),
+         ([3], "not the name of a vertex group"), ({"feet": 1}, "not the name of a vertex group"),
+         (None, "not the name of a vertex group")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("keep", "found"), KEEPS, ids=str)
+def test_what_stays_is_one_group_and_no_second_one_is_left_out_unsaid(keep, found, tmp_path, package):
+    module = package("pipelines.volumes.handle_file")
+    path = tmp_path / "h.json"
+    path.write_text(json.dumps({"handles": [{"group": "a"}], "keep": keep}))
+    if isinstance(found, tuple):
+        assert module.read_handle_file(path).keep == found
+        return
+    with pytest.raises(module.HandleFileError, match=found):
+        module.read_handle_file(path)
+
+
 def test_what_is_lost_by_an_undo_is_disturbed(package):
     live, run = package("session.live"), package("session.run")
     for module, words in ((live, "^Something was undone$"), (run, "^Something was undone meanwhile$")):

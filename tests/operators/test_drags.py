@@ -308,6 +308,22 @@ def test_landmarks_are_where_they_are_clicked_and_go_where_they_are_dragged(pack
     assert window.hints[-1] is None and len(empties()) == 2
 
 
+@pytest.mark.parametrize("made", [(2, 10), (10, 2), (1, 2, 3), (9, 10, 11), (100, 20, 3)], ids=str)
+def test_halves_that_wait_are_met_in_the_order_of_their_numbers(package, made):
+    """Not in that of their letters, by which 10 is before 2, and not in that in which they were made."""
+    place = package("operators.shapes.landmarks").place
+    objects = (scenes.bump(name="A"), scenes.bump(name="B", offset=3.0))
+    put = package("blender.shapes.landmarks").put_landmark
+    for number in made:
+        put(objects[0], f"LM_{number}", (0.1, 0.2, 0.3))
+    met = [place(objects, objects[1], "LM_", (3.5, 0.5, 0.1), False) for _ in made]
+    assert [e.name.partition(".")[0] for (e,) in met] == [f"LM_{number}" for number in sorted(made)]
+    # And then there is a new one.
+    (free,) = place(objects, objects[1], "LM_", (3.2, 0.5, 0.1), False)
+    missing = next(k for k in range(1, len(made) + 2) if k not in made)
+    assert free.name == f"LM_{missing}"
+
+
 def test_keys_while_landmarks_are_picked(package, monkeypatch):
     objects, window, operator = picking(package, monkeypatch)
     assert operator.mirrored is False

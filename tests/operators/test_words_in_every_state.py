@@ -28,8 +28,7 @@ def test_every_operator_is_called(package):
 def alone(package, monkeypatch):
     """What tests before have left is put away."""
     monkeypatch.setattr(package("session.queue"), "state", None)
-    # A hundred thousand points take most of the time of so small a mesh.
-    monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 500)
+    operator_states.with_few_samples(package, monkeypatch)
     yield package("session.last_run")
     package("session.last_run").forget()
 

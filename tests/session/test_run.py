@@ -176,6 +176,26 @@ def test_a_mesh_that_changes_meanwhile_ends_the_run(kind):
         assert uv_bytes(mesh) == uv
 
 
+# What ends a run though no mesh may look otherwise then: what it works on is another one.
+EXCHANGES = ("undo_post", "redo_post", "load_pre")
+
+
+@pytest.mark.parametrize("kind", EXCHANGES)
+def test_what_blender_exchanges_is_heard_of_and_no_longer_than_the_run_lasts(kind, package):
+    obj = scene("uv.omt_unwrap", "OBJECT")
+    handlers = [getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers)]
+    handlers = [found for found in handlers if isinstance(found, list)]
+    before = [list(found) for found in handlers]
+    watch = package("session.run").Watch(bpy.context, [obj])
+    watch.check()
+    (heard,) = (f for f in getattr(bpy.app.handlers, kind) if getattr(f, "__self__", None) is watch)
+    heard(None)
+    with pytest.raises(package("session.run").Disturbed, match="meanwhile"):
+        watch.check()
+    watch.close()
+    assert [list(found) for found in handlers] == before
+
+
 @pytest.mark.parametrize("which", [0, 1])
 @pytest.mark.parametrize("kind", ["vertex", "uv", "renamed", "deleted"])
 def test_one_of_several_that_changes_meanwhile_ends_the_run(kind, which):

@@ -20,6 +20,7 @@ CALLS: list[tuple[str, dict]] = [
     ("uv.omt_magnify", {"quality": "DRAFT", "weight_group": "gone", "source": "MESH"}),
     ("uv.omt_magnify", {"quality": "DRAFT", "region": "ATTRIBUTE", "attribute": "gone", "source": "UV"}),
     ("uv.omt_magnify", {"quality": "DRAFT", "weight_group": "part", "further": "gone=2", "source": "UV"}),
+    ("uv.omt_magnify", {"quality": "DRAFT", "weight_group": "part", "source": "AUTO"}),
     ("uv.omt_sphere", {"quality": "DRAFT", "fill_holes": False}),
     ("uv.omt_sphere", {"quality": "DRAFT", "orientation": "GROUPS", "pole_group": "gone"}),
     ("uv.omt_sphere", {"quality": "DRAFT", "weight_group": "gone"}),
@@ -58,6 +59,7 @@ CALLS: list[tuple[str, dict]] = [
     ("object.omt_similar", {"index": "/gone.npz"}),
     ("mesh.omt_partition", {"cells": 3, "relax": 0, "write": "ATTRIBUTE"}),
     ("mesh.omt_partition", {"cells": 3, "relax": 0, "write": "FACE_SETS", "capacity_group": "part"}),
+    *(("mesh.omt_partition", {"cells": 3, "relax": 0, "write": kind}) for kind in ("MESH", "POINTS")),
     ("uv.omt_queue", {}),
 ]  # fmt: skip
 # What takes long is called where it is refused at once.
@@ -82,6 +84,24 @@ def _one_without(faces: int) -> None:
     A.data.clear_geometry()
     if faces:
         A.data.from_pydata([(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)], [], [(0, 1, 2), (0, 1, 3)][:faces])
+
+
+def _one_without_uvs() -> None:
+    _, B = _patches()
+    B.data.uv_layers.remove(B.data.uv_layers[0])
+
+
+def _in_parts() -> None:
+    """Two patches, each with a smaller one beside it that comes first."""
+    for obj in _patches():
+        mesh = obj.data
+        points, faces = [tuple(v.co) for v in mesh.vertices], [tuple(p.vertices) for p in mesh.polygons]
+        mesh.clear_geometry()
+        apart = [(-1.5, 0, 0), (-1, 0, 0.1), (-1.1, 0.4, 0), (-1.4, 0.5, 0.2)]
+        mesh.from_pydata([*apart, *points], [], [(0, 1, 2, 3), *(tuple(v + 4 for v in face) for face in faces)])
+        scenes.set_uv(obj, 0.2 + 0.2 * scenes.seen_from_above(obj))
+        group = obj.vertex_groups.get("part") or obj.vertex_groups.new(name="part")
+        group.add([0, 5, 6], 0.7, "REPLACE")
 
 
 def _both_without() -> None:
@@ -168,6 +188,8 @@ STATES: dict[str, Callable] = {
     "nothing": lambda: None,
     "patches": _patches,
     "without UVs": lambda: _patches(uvs=False),
+    "one without UVs": _one_without_uvs,
+    "in parts": _in_parts,
     "one without vertices": lambda: _one_without(0),
     "one with faces of no area": lambda: _one_without(2),
     "both without vertices": _both_without,
@@ -185,8 +207,8 @@ STATES: dict[str, Callable] = {
     "weight paint": _painted,
 }
 # Where what takes long is not refused at once.
-GOOD = {"patches", "without UVs", "folded", "bodies", "one mesh", "one hidden", "faces of one selected",
-        "beside a curve", "one with faces of no area", "weight paint"}  # fmt: skip
+GOOD = {"patches", "without UVs", "one without UVs", "in parts", "folded", "bodies", "one mesh", "one hidden",
+        "faces of one selected", "beside a curve", "one with faces of no area", "weight paint"}  # fmt: skip
 # Whole numbers count things; others hang on the last digits.
 NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+| %)|\d+\.\d+")
 SPACES = re.compile(r"\s+")
@@ -205,6 +227,12 @@ def selected(obj) -> str:
     found = [sum(item.select for item in items) for items in (mesh.vertices, mesh.edges, mesh.polygons)]
     bpy.data.meshes.remove(mesh)
     return f"{obj.name} {' '.join(map(str, found))}"
+
+
+def with_few_samples(package, monkeypatch) -> None:
+    """Hundreds of thousands of points take most of the time of so small meshes."""
+    monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 500)
+    monkeypatch.setitem(package("solver.maps.overlap").overlap_share.__kwdefaults__, "samples", 2000)
 
 
 def begin(make: Callable) -> None:

@@ -11,6 +11,7 @@ from ..selection import read_file
 from .formats import check_kept
 
 EQUAL = "equal"
+NEW_OBJECTS = ("mesh", "points")
 
 
 def add(commands) -> None:
@@ -48,7 +49,7 @@ def of_cells(options: argparse.Namespace) -> PartitionSettings:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ...blender.mesh import check_local
+    from ...blender.mesh import check_local, check_stretch
     from ...blender.shapes.cell_faces import check_cells
     from ...blender.vertex_groups import avoided
     from ...pipelines.shapes.partition import partition_surface
@@ -60,13 +61,15 @@ def run(options: argparse.Namespace) -> None:
     for obj in objects:
         check_local(obj)
         check_cells(obj, options.write)
+        if options.write in NEW_OBJECTS:
+            with refusals(name=obj.name):
+                check_stretch(obj)
     weights = avoided(objects, "" if options.capacity == EQUAL else options.capacity)
     found = []
     for (obj, reading), mine in zip(pairs, weights, strict=True):
         with refusals(name=obj.name):
             found.append(drain_shown(partition_surface(reading.surface, reading.faces, mine, of_cells(options))))
-    with refusals():
-        made = _write(options, pairs, found)
+    made = _write(options, pairs, found)
     told = [(k, text) for k, partition in enumerate(found) for text in partition.warnings]
     warnings = warn(objects, told, _save(options, made))
     _show(options, pairs, made, found)
@@ -79,16 +82,15 @@ def run(options: argparse.Namespace) -> None:
 
 def _write(options: argparse.Namespace, pairs: list, found: list) -> list:
     """Write the cells into the objects, or make new ones; the objects to save."""
-    from ...blender.mesh import check_stretch
     from ...blender.shapes.cell_faces import write_cells
     from ...blender.shapes.cell_objects import new_cell_mesh, new_points, read_carried
 
     made = []
     for (obj, reading), partition in zip(pairs, found, strict=True):
-        if options.write in ("mesh", "points"):
-            check_stretch(obj)
         if options.write == "mesh":
-            made.append(new_cell_mesh(obj, reading.surface, reading.faces, partition, read_carried(obj)))
+            with refusals(name=obj.name):
+                carried = read_carried(obj)
+            made.append(new_cell_mesh(obj, reading.surface, reading.faces, partition, carried))
         elif options.write == "points":
             made.append(new_points(obj, partition))
         else:

@@ -59,8 +59,17 @@ def read_handle_file(path: Path) -> HandleFile:
         strange = sorted(handle.keys() - KNOWN)
         if strange:
             raise HandleFileError(f"{path}: handle {k} has {strange[0]!r}. Known are {', '.join(sorted(KNOWN))}.")
-    keep = data.get("keep", []) if isinstance(data, dict) else []
-    return HandleFile(path, tuple(handles), tuple([keep] if isinstance(keep, str) else keep))
+    return HandleFile(path, tuple(handles), _kept(path, data.get("keep", []) if isinstance(data, dict) else []))
+
+
+def _kept(path: Path, keep) -> tuple[str, ...]:
+    """The name of the group that stays, if there is one."""
+    names = [keep] if isinstance(keep, str) else keep
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise HandleFileError(f"{path}: 'keep' is not the name of a vertex group. Give one, as text.")
+    if len(names) > 1:
+        raise HandleFileError(f"{path}: 'keep' names {len(names)} vertex groups. Give one that has all that stays.")
+    return tuple(names)
 
 
 def handles_of(
