@@ -1,4 +1,4 @@
-"""What every command says, and with which status it ends, of two meshes in which state, choices seldom taken among them:
+"""What every command says, and with which status it ends, of two meshes in which state, seldom choices among them:
 a table keeps it, word for word but for numbers. What is refused is said of the mesh that it is about, and nothing is
 written then; whatever a report holds of its own has its place."""
 
