@@ -84,6 +84,7 @@ def _one_without(faces: int) -> None:
     A.data.clear_geometry()
     if faces:
         A.data.from_pydata([(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)], [], [(0, 1, 2), (0, 1, 3)][:faces])
+        scenes.without_chosen_edges(A.data)
 
 
 def _one_without_uvs() -> None:
@@ -99,6 +100,7 @@ def _in_parts() -> None:
         mesh.clear_geometry()
         apart = [(-1.5, 0, 0), (-1, 0, 0.1), (-1.1, 0.4, 0), (-1.4, 0.5, 0.2)]
         mesh.from_pydata([*apart, *points], [], [(0, 1, 2, 3), *(tuple(v + 4 for v in face) for face in faces)])
+        scenes.without_chosen_edges(mesh)
         scenes.set_uv(obj, 0.2 + 0.2 * scenes.seen_from_above(obj))
         group = obj.vertex_groups.get("part") or obj.vertex_groups.new(name="part")
         group.add([0, 5, 6], 0.7, "REPLACE")
@@ -146,6 +148,7 @@ def _three_at_an_edge(obj) -> None:
     points, faces = [tuple(v.co) for v in mesh.vertices], [tuple(p.vertices) for p in mesh.polygons]
     mesh.clear_geometry()
     mesh.from_pydata([*points, (2.0, 0.5, 1.0)], [], [*faces, (1, 6, len(points)), (6, 1, len(points))])
+    scenes.without_chosen_edges(mesh)
 
 
 def _bodies() -> None:

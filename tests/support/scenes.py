@@ -13,9 +13,7 @@ def add(vertices, faces, name="Mesh", seams=(), edges=()):
     """A selected, active object in Object Mode; seams are vertex pairs."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([tuple(map(float, v)) for v in vertices], list(edges), [tuple(map(int, f)) for f in faces])
-    # from_pydata of Blender 5.0 gives it a wrong type, and edge.select = ... crashes.
-    if ".select_edge" in mesh.attributes:
-        mesh.attributes.remove(mesh.attributes[".select_edge"])
+    without_chosen_edges(mesh)
     pairs = {frozenset(map(int, pair)) for pair in seams}
     for edge in mesh.edges:
         edge.use_seam = frozenset(edge.vertices) in pairs
@@ -24,6 +22,12 @@ def add(vertices, faces, name="Mesh", seams=(), edges=()):
     bpy.context.collection.objects.link(obj)
     select([*bpy.context.selected_objects, obj])
     return obj
+
+
+def without_chosen_edges(mesh):
+    """No edge selected: from_pydata of Blender 5.0 gives that a wrong type: chance decides, and to set it crashes."""
+    if ".select_edge" in mesh.attributes:
+        mesh.attributes.remove(mesh.attributes[".select_edge"])
 
 
 def select(objects):
