@@ -122,16 +122,21 @@ def _in_bevels(
     area, first = face_areas(positions, triangles), np.unique(side, return_index=True)[1]
     size, own = np.bincount(side, area), component_of[first]
     large = np.flatnonzero(among[own] & (size >= LARGE_SIDE * np.bincount(component_of, area)[own]))
-    middle = np.stack([np.bincount(side, area * x) for x in positions[triangles].mean(axis=1).T], axis=1)
-    normal = face_normals(positions, triangles[first[large]])
+    large = large[np.argsort(own[large], kind="stable")]
+    middle = np.stack([np.bincount(side, area * x) for x in positions[triangles].mean(axis=1).T], axis=1)[large]
+    normal, middle = face_normals(positions, triangles[first[large]]), middle / size[large, None]
     loops = _loops_of(positions, *gluing.ends(boundary), loop)
-    apart = loops.centre[:, None] - middle[large] / size[large, None]
-    within = np.abs((apart * normal).sum(axis=2)) <= BEVEL * loops.radius[:, None]
-    within &= np.abs(loops.normal @ normal.T) >= PARALLEL
     steep = face_normals(positions, triangles[boundary // 3])
-    bevelled = np.stack([np.bincount(loop, x) for x in steep.T], axis=1) / np.bincount(loop)[:, None]
-    within &= np.abs(bevelled @ normal.T) < PARALLEL
-    return (within & (at[:, None] == own[large])).any(axis=1)
+    bevel = np.stack([np.bincount(loop, x) for x in steep.T], axis=1) / np.bincount(loop)[:, None]
+    # Every loop with the sides of its own component: of thousands there are few in each.
+    begin, end = np.searchsorted(own[large], [at, at + 1])
+    one = np.repeat(np.arange(len(at)), end - begin)
+    two = np.arange(len(one)) + np.repeat(end - np.cumsum(end - begin), end - begin)
+    away, parallel, level = (
+        np.abs((x * normal[two]).sum(axis=1)) for x in (loops.centre[one] - middle[two], loops.normal[one], bevel[one])
+    )
+    within = (away <= BEVEL * loops.radius[one]) & (parallel >= PARALLEL) & (level < PARALLEL)
+    return np.bincount(one[within], minlength=len(at)) > 0
 
 
 @dataclass(frozen=True)
