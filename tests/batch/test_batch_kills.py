@@ -13,7 +13,7 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
-from contextlib import suppress
+from contextlib import closing, suppress
 from threading import Event
 
 import numpy as np
@@ -89,17 +89,17 @@ def running(work):
     path = work.root / "out.manifest.sqlite"
     if not path.exists():
         return set()
-    base = sqlite3.connect(path, timeout=20)
-    if not base.execute("SELECT COUNT(*) FROM sqlite_master WHERE name = 'runs'").fetchone()[0]:
-        return set()
-    return {name for (name,) in base.execute("SELECT name FROM runs WHERE state = 'running'")}
+    with closing(sqlite3.connect(path, timeout=20)) as base:
+        if not base.execute("SELECT COUNT(*) FROM sqlite_master WHERE name = 'runs'").fetchone()[0]:
+            return set()
+        return {name for (name,) in base.execute("SELECT name FROM runs WHERE state = 'running'")}
 
 
 def check(work, flights):
     """All is done and whole, the manifest agrees, and nothing was done twice but what was in flight."""
-    base = sqlite3.connect(work.root / "out.manifest.sqlite")
-    assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-    assert dict(base.execute("SELECT state, COUNT(*) FROM runs GROUP BY state")) == {"done": FILES}
+    with closing(sqlite3.connect(work.root / "out.manifest.sqlite")) as base:
+        assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        assert dict(base.execute("SELECT state, COUNT(*) FROM runs GROUP BY state")) == {"done": FILES}
     for k in range(FILES):
         source = (work.root / "in" / f"m{k}.obj").read_bytes()
         assert (work.root / "out" / f"m{k}.obj").read_bytes() == source[::-1] * 1000
