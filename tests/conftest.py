@@ -104,12 +104,11 @@ def closed_files(request):
     """Whatever a test does with files in a folder of its own, it leaves none of them open."""
     yield
     folder = request.node.funcargs.get("tmp_path")
-    still = opened_in(folder.resolve()) if folder is not None else []
-    if still and folder is not None:
+    if folder is not None and opened_in(folder.resolve()):
         # What nobody holds any more is closed with what it refers to, and that to it.
         gc.collect()
         still = opened_in(folder.resolve())
-    assert not still, f"still open: {still}"
+        assert not still, f"still open: {still}"
 
 
 @pytest.fixture(autouse=True)

@@ -52,7 +52,7 @@ CALLS = [
     "signature @in.blend -o @out.npz --points 40",
 ]  # fmt: skip
 # These are shown elsewhere: they ask for folders and tables.
-WITHOUT = {"average", "library", "similar", "distances", "block"}
+WITHOUT = {"average", "library", "similar"}
 # What takes long is called where it is refused at once.
 LONG = {"remesh", "volume", "match", "distance", "signature", "diagram", "queue", "sphere", "flow"}
 # States that files do not keep, or that are the same there as others.
@@ -94,7 +94,7 @@ def told(run, folder: Path, call: str) -> list[str]:
 
 
 def test_every_command_is_called(package):
-    assert {call.split()[0] for call in CALLS} | WITHOUT == set(commands(package)) | (WITHOUT - set(commands(package)))
+    assert {call.split()[0] for call in CALLS} | WITHOUT == set(commands(package))
 
 
 def test_what_is_said_in_which_state_is_that_of_the_table(package, run, tmp_path, monkeypatch):

@@ -25,7 +25,7 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import Net, net
 from .gluing_facts import TurningLines, cost_factors, in_unit_box, to_search, total_curvature, turning_lines
 from .handle_partition import partition_pairs, wall_pairs
-from .hole_filling import MANY, around_pockets, fill_holes, level_parts, sieved
+from .hole_filling import MANY, LevelParts, around_pockets, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
 from .steiner_points import MOST_ENDS, branching_tree
 from .symmetric_cut import outlined_cut, symmetric_cut, symmetric_halves
@@ -181,7 +181,7 @@ def cut_gluing(
         gone |= around_pockets(surface, gluing, positions, gone, search, comes_apart)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
-    holes, sieves, level = 0, not fill, np.zeros(len(gluing.triangles), dtype=bool)
+    holes, sieves, level = 0, not fill, None
     if sieve is not None and search is not None:
         level = level_parts(gluing, positions)
     if fill or sieve is not None:
@@ -257,13 +257,13 @@ class _Cutter:
     outline: bool
 
     def cut(
-        self, one_sided: np.ndarray, unit: float, sieves: bool, level: np.ndarray
+        self, one_sided: np.ndarray, unit: float, sieves: bool, level: LevelParts | None
     ) -> Steps[tuple[np.ndarray, list, int]]:
         """Pairs (p,) bool to cut so that every component is a disk, what was done to each that was cut, and how many
         vertices a weld would join.
 
         sieves : what has been filled are sieves, which are cut to extremities as closed components are, disks too,
-        but for those of the triangles `level`
+        but for those that are `level`
         """
         component_of = components(self.gluing)
         whole = classify(self.gluing, corner_classes(self.gluing), component_of, one_sided)
@@ -281,7 +281,8 @@ class _Cutter:
         known = Copies(), Copies()  # Of parts that are not searched, and of others.
         patched = np.zeros(len(members), dtype=bool)
         patched[component_of[self.gluing.owner < 0]] = True
-        patched[component_of[np.flatnonzero(level)]] = False
+        if level is not None:
+            patched[component_of[np.flatnonzero(level.triangles)]] = False
         searched = self._to_search(component_of, corner_class, members)
         chosen_ones = np.flatnonzero(~whole.is_disk | (patched & sieves) | searched)
         for count, k in enumerate(chosen_ones):

@@ -18,7 +18,7 @@ from ..errors import plural
 from ..mesh.geometry import face_areas, face_normals, lengths, unit
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface, is_seam
-from ..mesh.topology import graph_components, halfedges, pair_keys
+from ..mesh.topology import expand, graph_components, halfedges, pair_keys
 from .component import NOISE, SideFinder
 from .gluing_facts import in_unit_box, to_search, total_curvature
 
@@ -64,7 +64,7 @@ def fill_holes(
     gluing: Gluing,
     one_sided: np.ndarray,
     sieve: int | None = None,
-    whole: np.ndarray | None = None,
+    level: LevelParts | None = None,
     costs: Callable[[], SeamCosts] | None = None,
     closing: bool = True,
 ) -> Filled:
@@ -72,13 +72,13 @@ def fill_holes(
 
     one_sided : (m,) triangles that are left alone
     sieve : fill only where there are more than so many holes, and leave outer boundaries open
-    whole : (m,) triangles of components that are filled all the same
+    level : where holes are filled all the same
     costs : gives those of seams; holes in a face are filled all the same
     closing : the last boundary of a component, too, unless some of its seams were marked
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
-    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, whole)
-    counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
+    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, level)
+    counted = len(np.unique(loop if level is None else loop[~level.triangles[boundary // 3]]))
     if costs is not None:
         boundary, loop = _with_holes_in_faces(surface, gluing, one_sided, boundary, costs, closing)
     if len(boundary) == 0:
@@ -87,23 +87,32 @@ def fill_holes(
     return replace(filled, holes=counted)
 
 
-def level_parts(gluing: Gluing, positions: np.ndarray) -> np.ndarray:
-    """Triangles (m,) bool of components that look one way but do not quite unroll, and of others that do not those at
-    holes in flat sides: they need no cut.
+@dataclass(frozen=True)
+class LevelParts:
+    """Where holes need no cut: the triangles (m,) bool of components that look one way but do not quite unroll, and the
+    halfedges (3m,) bool around holes with bevels in flat sides of those that do not."""
 
-    Cuts to the holes of what unrolls close again in its map.
-    """
+    parts: np.ndarray
+    bevelled: np.ndarray
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Triangles (m,) bool of either."""
+        return self.parts | self.bevelled.reshape(-1, 3).any(axis=1)
+
+
+def level_parts(gluing: Gluing, positions: np.ndarray) -> LevelParts:
+    """Where holes need no cut. Cuts to those of what unrolls close again in its map."""
     component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
     area = face_areas(positions, triangles)
     vector = area[:, None] * face_normals(positions, triangles)
     whole = np.linalg.norm(np.stack([np.bincount(component_of, x) for x in vector.T]), axis=0)
-    curvature = total_curvature(gluing, corner_classes(gluing), component_of, positions)
-    level = (whole >= LEVEL * np.bincount(component_of, area))[component_of]
+    bent = total_curvature(gluing, corner_classes(gluing), component_of, positions) > FLAT
+    level = (whole >= LEVEL * np.bincount(component_of, area)) & bent
+    bevelled = np.zeros(3 * len(triangles), dtype=bool)
     boundary, loop = _boundaries(gluing, np.zeros(len(triangles), dtype=bool))
-    if len(boundary):
-        bevelled = _in_bevels(gluing, positions, boundary, loop, curvature > FLAT)
-        level[boundary[bevelled[loop]] // 3] = True
-    return level & (curvature > FLAT)[component_of]
+    bevelled[boundary] = _in_bevels(gluing, positions, boundary, loop, bent)[loop]
+    return LevelParts(level[component_of], bevelled)
 
 
 def _in_bevels(
@@ -125,13 +134,12 @@ def _in_bevels(
     large = large[np.argsort(own[large], kind="stable")]
     middle = np.stack([np.bincount(side, area * x) for x in positions[triangles].mean(axis=1).T], axis=1)[large]
     normal, middle = face_normals(positions, triangles[first[large]]), middle / size[large, None]
-    loops = _loops_of(positions, *gluing.ends(boundary), loop)
-    steep = face_normals(positions, triangles[boundary // 3])
-    bevel = np.stack([np.bincount(loop, x) for x in steep.T], axis=1) / np.bincount(loop)[:, None]
+    loops = _Loops.around(positions, *gluing.ends(boundary), loop)
+    bevel = _means(face_normals(positions, triangles[boundary // 3]), loop)
     # Every loop with the sides of its own component: of thousands there are few in each.
     begin, end = np.searchsorted(own[large], [at, at + 1])
-    one = np.repeat(np.arange(len(at)), end - begin)
-    two = np.arange(len(one)) + np.repeat(end - np.cumsum(end - begin), end - begin)
+    one, two = expand(end - begin)
+    two = two + begin[one]
     away, parallel, level = (
         np.abs((x * normal[two]).sum(axis=1)) for x in (loops.centre[one] - middle[two], loops.normal[one], bevel[one])
     )
@@ -147,21 +155,28 @@ class _Loops:
     radius: np.ndarray
     normal: np.ndarray
 
+    @staticmethod
+    def around(positions: np.ndarray, a: np.ndarray, b: np.ndarray, loop: np.ndarray) -> _Loops:
+        """What sides go around, from vertices a (r,) to b (r,), by the numbers (r,) of their loops."""
+        centre = _means(positions[a], loop)
+        out = positions[a] - centre[loop]
+        normal = np.cross(out, positions[b] - centre[loop])
+        size = np.maximum(np.bincount(loop, lengths(normal)), 1e-300)
+        return _Loops(
+            centre=centre,
+            radius=np.bincount(loop, lengths(out)) / np.bincount(loop),
+            normal=_sums(normal, loop) / size[:, None],
+        )
 
-def _loops_of(positions: np.ndarray, a: np.ndarray, b: np.ndarray, loop: np.ndarray) -> _Loops:
-    """What the loops (r,) of sides go around, from vertices a (r,) to b (r,)."""
 
-    def sums(of: np.ndarray) -> np.ndarray:
-        return np.stack([np.bincount(loop, x) for x in of.T], axis=1)
+def _sums(of: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Sums (l,3) of vectors (r,3) over loops, by the numbers (r,) of these."""
+    return np.stack([np.bincount(loop, x) for x in of.T], axis=1)
 
-    centre = sums(positions[a]) / np.bincount(loop)[:, None]
-    out = positions[a] - centre[loop]
-    normal = np.cross(out, positions[b] - centre[loop])
-    return _Loops(
-        centre=centre,
-        radius=np.bincount(loop, lengths(out)) / np.bincount(loop),
-        normal=sums(normal) / np.maximum(np.bincount(loop, lengths(normal)), 1e-300)[:, None],
-    )
+
+def _means(of: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Means (l,3) of vectors (r,3) over loops, by the numbers (r,) of these."""
+    return _sums(of, loop) / np.bincount(loop)[:, None]
 
 
 def sieved(holes: int) -> str:
@@ -175,13 +190,13 @@ def hole_boundaries(
     gluing: Gluing,
     one_sided: np.ndarray,
     sieve: int | None = None,
-    whole: np.ndarray | None = None,
+    level: LevelParts | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The halfedges (r,) around the holes that `fill_holes` fills, and the number (r,) of the hole of each."""
     boundary, loop = _boundaries(gluing, one_sided)
     if len(boundary) == 0:
         return boundary, boundary
-    return _chosen(boundary, loop, _holes(positions, gluing, boundary, loop, sieve, whole))
+    return _chosen(boundary, loop, _holes(positions, gluing, boundary, loop, sieve, level))
 
 
 def _boundaries(gluing: Gluing, one_sided: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -242,15 +257,9 @@ def _opens(
 ) -> np.ndarray:
     """Holes (l,) bool in something smooth that look to the front, from their sides (r,), numbers (r,) and the normals
     (r,3) of the triangles at them."""
-
-    def sums(of: np.ndarray) -> np.ndarray:
-        return np.stack([np.bincount(loop, x) for x in of.T], axis=1)
-
-    count = np.bincount(loop)[:, None]
-    centre = (sums(positions[a]) / count)[loop]
     # Around the hole as around the triangles at it, the other way round.
-    normal = unit(-sums(np.cross(positions[a] - centre, positions[b] - centre)))
-    smooth = (normal * sums(normals) / count).sum(axis=1) >= SMOOTH
+    normal = unit(-_Loops.around(positions, a, b, loop).normal)
+    smooth = (normal * _means(normals, loop)).sum(axis=1) >= SMOOTH
     # What looks to the back is in no face; but a body may be inside out.
     return smooth & (np.abs(normal @ costs.facing.front) >= FORWARDS)
 
@@ -261,7 +270,7 @@ def _holes(
     boundary: np.ndarray,
     loop: np.ndarray,
     sieve: int | None,
-    whole: np.ndarray | None,
+    level: LevelParts | None,
 ) -> np.ndarray:
     """Loops (l,) bool that are not the longest of their component, or that are holes of sieves or of the triangles
     `whole`."""
@@ -282,12 +291,11 @@ def _holes(
         inner = hole.copy()
         ordinary = length[order[first + np.minimum(count // 2, MANY)]]
         hole[order] &= (count > sieve + 1)[place] & (length[order] <= OUTSTANDING * ordinary[place])
-        if whole is not None and whole.any():
+        if level is not None:
             size = np.bincount(component_at, face_areas(positions, gluing.vertex[gluing.triangles]))
             # A disk inside such a loop is no more than that.
             small = (2 * around) ** 2 <= 4 * np.pi * SMALL * size[component_of]
-            bevelled = _in_bevels(gluing, positions, boundary, loop, np.ones(len(size), dtype=bool))
-            hole |= inner & (small | bevelled) & whole[first_of // 3]
+            hole |= inner & (small & level.parts[first_of // 3] | level.bevelled[first_of])
     return hole
 
 

@@ -319,7 +319,7 @@ def test_level_parts_look_one_way_and_are_not_quite_flat():
     for height, level in ((0.0, False), (0.02, True), (2.0, False)):
         bent = V.copy()
         bent[:, 2] = height * np.sin(5 * V[:, 0]) * np.sin(4 * V[:, 1])
-        found = hole_filling.level_parts(gluing_of(bent, F), bent)
+        found = hole_filling.level_parts(gluing_of(bent, F), bent).triangles
         assert found.shape == (len(F),) and (found == level).all()
 
 

@@ -418,17 +418,18 @@ def folded_plate(depth, n=16):
 def test_holes_in_bevels_beside_flat_sides_need_no_cut(depth, level):
     V, F, around = folded_plate(depth)
     gluing = gluing_of(V, F)
-    found = level_parts(gluing, V)
-    boundary, loop = hole_boundaries(V, gluing, np.zeros(len(F), bool), MANY, found)
+    parts = level_parts(gluing, V)
+    boundary, loop = hole_boundaries(V, gluing, np.zeros(len(F), bool), MANY, parts)
+    found = parts.triangles
     assert len(np.unique(loop)) == level and found.any() == level
     assert np.isin(np.flatnonzero(found), around).all() and np.isin(boundary // 3, around).all()
     # Wherever it lies, and on a part that is cut in two.
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    np.testing.assert_array_equal(level_parts(gluing, 3 * V @ turn + 5), found)
+    np.testing.assert_array_equal(level_parts(gluing, 3 * V @ turn + 5).triangles, found)
     two = gluing_of(np.concatenate([V, V + 50]), np.concatenate([F, F + len(V)]))
-    np.testing.assert_array_equal(level_parts(two, np.concatenate([V, V + 50])), np.tile(found, 2))
+    np.testing.assert_array_equal(level_parts(two, np.concatenate([V, V + 50])).triangles, np.tile(found, 2))
 
 
 def test_open_ends_of_tubes_are_no_holes_in_sides():
     V, F = tube(4, 12, lambda i, j: np.zeros(len(i), bool), bulge=0.2)
-    assert not level_parts(gluing_of(V, F), V).any()
+    assert not level_parts(gluing_of(V, F), V).triangles.any()
