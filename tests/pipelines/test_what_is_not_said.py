@@ -15,9 +15,9 @@ from omt_uv import pipelines, solver
 
 # Names that mean one thing here and another there.
 DIFFERENT = {"apart", "around", "aspect", "axes", "before", "corners", "count", "crossing", "domain", "features",
-             "fixed", "flat", "keep", "kind", "least", "max_rounds", "mirror", "most", "near", "options", "order",
-             "patient", "quads", "radius", "relaxed", "rounds", "samples", "seams", "share", "sharp", "size",
-             "start", "sweeps", "tolerance", "vertices", "whole"}  # fmt: skip
+             "fixed", "flat", "keep", "kind", "least", "level", "max_rounds", "mirror", "most", "near", "options",
+             "order", "patient", "quads", "radius", "relaxed", "rounds", "samples", "seams", "share", "sharp", "size",
+             "start", "sweeps", "tolerance", "vertices"}  # fmt: skip
 # What starts from another value than the others do, and may.
 OTHERWISE = {
     "balance": {"solver.registration.results.RegistrationOptions"},
