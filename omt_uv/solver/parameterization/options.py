@@ -10,11 +10,19 @@ import numpy as np
 from ..analysis.seam_costs import SeamPreferences
 from ..cutting.disk_charts import SEAMS
 from ..errors import CUT_FURTHER, percent, plural
+from ..mesh.geometry import face_areas
+from ..mesh.surface import Surface
+from ..mesh.topology import graph_components
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
 
 KINDS = ("authalic", "conformal", "polar")
 MOST_ASPECT = 1e4
+# Parts of less than this share of the area, if all of them together have no more than that one, may shear as much as
+# this power of a bound: an eye is not slit for what nobody sees, and the mean of the whole hardly moves.
+SMALL_PART = 0.03
+SMALL_PARTS = 0.08
+LENIENCE = 1.4
 
 
 @dataclass(frozen=True)
@@ -33,6 +41,20 @@ class ShearBound:
     def __post_init__(self):
         if not self.bound > 1:
             raise ValueError(f"no map shears less than 1; the bound must be greater, not {self.bound}")
+
+    def lenience(self, surface: Surface, faces: np.ndarray | None) -> np.ndarray:
+        """The power (f,) of the bound that every polygon may shear: more than 1 for small parts of the polygons
+        `faces` (f,) bool of a surface, all by default."""
+        triangles, vertices = surface.corner_vertex[surface.triangles], len(surface.positions)
+        one, other = np.concatenate([triangles[:, :2], triangles[:, 1:]]).T
+        part = graph_components(one, other, vertices)[1][triangles[:, 0]]
+        chosen = 1.0 if faces is None else faces[surface.triangle_face]
+        area = np.bincount(part, chosen * face_areas(surface.positions, triangles))
+        small = area < SMALL_PART * area.sum()
+        found = np.ones(len(surface.face_start) - 1)
+        if area[small].sum() <= SMALL_PARTS * area.sum():
+            found[surface.triangle_face[small[part]]] = LENIENCE
+        return found
 
     def missed(self, mean: np.ndarray, area: np.ndarray, by_hand: np.ndarray, why: str) -> Iterator[str]:
         """Warnings of charts of such areas (k,) and mean shear (k,) above the bound, those with seams marked by hand

@@ -394,7 +394,8 @@ def _as_flat(last: Round, new: Round, of: np.ndarray) -> np.ndarray:
 def _result(last: Round, search: ShearSearch, warnings: tuple[str, ...], early: EarlyEnd) -> BoundedShear:
     """The charts and maps of a round, with warnings of how they were made and of those that miss the bound."""
     by_hand, why = ~np.isin(np.arange(len(last.charts)), last.searched), ENDED_EARLY if early.is_asked else MORE_SEAMS
-    missed = tuple(search.shear.missed(last.mean, last.area, by_hand, why))
+    mean = last.mean ** np.where(last.mean > last.bound, search.lenience_of(last.charts), 1.0)
+    missed = tuple(search.shear.missed(mean, last.area, by_hand, why))
     # Another call for the same search need not do in vain what this one did.
     search.memory.update(last.memory)
     return BoundedShear(DiskCharts(last.charts, last.cuts, warnings), last.maps, missed, early.is_asked)

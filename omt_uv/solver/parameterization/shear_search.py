@@ -44,10 +44,8 @@ MOST_STEEP = 0.01
 LEAST_AREA = 1e-4
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
 NO_EXCESS = 0.005
-# What shears no more lies flat.
-UNSHEARED = 1.001
-# What misses the bound by less misses it by little.
-NEARLY = 0.03
+UNSHEARED = 1.001  # What shears no more lies flat.
+NEARLY = 0.03  # What misses the bound by less misses it by little.
 # Where a second search and later ones take off less than this share of what is missing, no seams are left that pay.
 LITTLE = 0.1
 # A chart with less than this share of the square of log(shear) that the bound allows may do with a shorter cut.
@@ -87,8 +85,8 @@ class ShearSearch:
     seams_of: Callable[[Surface, np.ndarray], Steps[np.ndarray]] | None = None
 
     def first_spread(self) -> np.ndarray:
-        """The spread (f,) to begin with, see `SeamSearch`."""
-        return np.full(self.count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
+        """The spread (f,) to begin with, see `SeamSearch`; small parts have a map first, which takes no time."""
+        return SPREAD_OF_SHEAR * (self.lenience**2 * np.log(self.shear.bound)) ** 2
 
     def search(self, spread: np.ndarray) -> SeamSearch:
         """The search for a spread (f,)."""
@@ -203,6 +201,15 @@ class ShearSearch:
         """Polygons (k,) of parts whose seams were found on thinned surfaces, with all that was tried of maps."""
         return []
 
+    @cached_property
+    def lenience(self) -> np.ndarray:
+        """See `ShearBound.lenience`."""
+        return self.shear.lenience(self.surface, self.faces)
+
+    def lenience_of(self, charts: list[Chart]) -> np.ndarray:
+        """The same (k,) of charts."""
+        return self.lenience[[chart.faces[0] for chart in charts]]
+
     def is_thinned(self, chart: Chart) -> bool:
         """Whether the seams of a chart were found on a thinned surface."""
         return any(np.isin(chart.faces[0], polygons) for polygons in self.thinned)
@@ -236,10 +243,10 @@ class ShearSearch:
 
 @dataclass(frozen=True)
 class Round:
-    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the share
-    (k,) that is steep, the mean but above the bound where too much is (k,), the numbers of those that miss it and may
-    be cut for that, the keys (s,) of edges that stay cut when these are cut anew, and those (s,) of slits into what was
-    steep."""
+    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), of parts
+    that may shear more a root of it, the share (k,) that is steep, the mean but above the bound where too much is (k,),
+    the numbers of those that miss it and may be cut for that, the keys (s,) of edges that stay cut when these are cut
+    anew, and those (s,) of slits into what was steep."""
 
     charts: list[Chart]
     maps: list[ChartMap]
@@ -268,7 +275,7 @@ class Round:
         mean = np.array([area @ local / area.sum() for local, area in shear])
         area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
         # Slivers between sides have a shear, and nobody sees it.
-        mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0)
+        mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0) ** (1 / search.lenience_of(charts))
         steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
         pressing = np.array([pressing_shear(*pair, bound) for pair in zip(mean, steep, strict=True)])
         missed = np.flatnonzero(pressing > bound)
