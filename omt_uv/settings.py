@@ -114,7 +114,8 @@ class Settings:
     boundary, quality : an identifier of the lists above in lower case
     balance : from 0, exact areas, to 1, least shear
     margin : pixels of a texture `texture_size` pixels wide; pack : arrange the islands in the unit square; tile : UDIM
-        number of the square, 1001 for the unit square; pack_around : leave room for islands of the tile that stay
+        number of the square, 1001 for the unit square; pack_around : leave room for islands of the tile that
+        stay; turn_to_fit : turn islands any way that packs closer
     seams : an identifier of the list above in lower case; fill_holes : take all boundaries of a part but the longest
         for filled; max_shear : cut islands further until their mean shear is below, 0 for no such cuts
     cut_further : those whose seams were marked by hand, too
@@ -128,6 +129,7 @@ class Settings:
     texture_size: int = DEFAULT_TEXTURE_SIZE
     pack: bool = True
     pack_around: bool = False
+    turn_to_fit: bool = False
     tile: int = FIRST_TILE
     seams: str = DEFAULT_SEAMS.lower()
     fill_holes: bool = False

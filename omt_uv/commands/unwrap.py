@@ -77,6 +77,7 @@ def add_settings(command: argparse.ArgumentParser) -> None:
     )
     add_subdivision(command)
     command.add_argument("--pack-around", action="store_true", help="leave room for islands with pins, which stay")
+    command.add_argument("--turn-to-fit", action="store_true", help="turn islands any way that packs them closer")
     command.add_argument("--no-pack", action="store_true", help="centre the islands one upon the other")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
 
@@ -92,6 +93,7 @@ def chosen(options: argparse.Namespace) -> Settings:
         tile=options.udim,
         pack=not options.no_pack,
         pack_around=options.pack_around,
+        turn_to_fit=options.turn_to_fit,
         seams=options.seams,
         fill_holes=options.fill_holes,
         max_shear=options.max_shear,

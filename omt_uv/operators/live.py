@@ -142,7 +142,8 @@ class UV_OT_omt_live(bpy.types.Operator):
             last = context.window_manager.operator_properties_last(UNWRAP)
             try:
                 with complaints():
-                    session.pack(Settings(margin=last.margin, texture_size=last.texture_size, tile=last.tile))
+                    chosen = ("margin", "texture_size", "tile", "turn_to_fit")
+                    session.pack(Settings(**{name: getattr(last, name) for name in chosen}))
             except Complaint as complaint:
                 self.report({"WARNING"}, str(complaint))
         return self._end(context, {"FINISHED"})

@@ -103,6 +103,12 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
         "that are not selected. Otherwise they are packed as if there were none",
         default=False,
     )
+    turn_to_fit: BoolProperty(
+        name="Turn to Fit",
+        description="Turn islands any way that packs them closer. Otherwise they stand as the body does, and "
+        "small ones may lie on a side",
+        default=False,
+    )
     uv_layer: StringProperty(
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
     )
@@ -122,6 +128,7 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
             texture_size=self.texture_size,
             pack=self.pack,
             pack_around=self.pack_around,
+            turn_to_fit=self.turn_to_fit,
             tile=self.tile,
             seams=self.seams.lower(),
             fill_holes=self.fill_holes,
@@ -211,5 +218,6 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     column = layout.column()
     column.active = properties.pack
     column.prop(properties, "pack_around")
+    column.prop(properties, "turn_to_fit")
     draw_margin(column, properties)
     choose_layer(layout, properties, "uv_layer")

@@ -123,10 +123,12 @@ def pack_islands(
     triangles: Sequence[np.ndarray],
     settings: Settings,
     around: Sequence[tuple[np.ndarray, np.ndarray]] = (),
+    turnable: np.ndarray | None = None,
 ) -> Steps[Packing]:
     """Pack islands (n_i,2) with triangles (m_i,3) into the UDIM tile of the settings, all by one scale.
 
-    around : points and triangles of islands that stay where they are, in UV space
+    around : points and triangles of islands that stay where they are, in UV space; turnable (k,) bool : islands
+        that may be turned by any angle where the settings allow that, all by default
 
     Raises
     ------
@@ -137,7 +139,13 @@ def pack_islands(
     origin = np.array(settings.tile_origin, dtype=float)
     if settings.pack:
         staying = [(points - origin, index) for points, index in around]
-        packed = yield from pack(islands, triangles, settings.margin, settings.texture_size, staying)
+        given = (islands, triangles, settings.margin, settings.texture_size, staying)
+        if settings.turn_to_fit:
+            from ..solver.packing.turning import pack_turned
+
+            packed = yield from pack_turned(*given, turnable)
+        else:
+            packed = yield from pack(*given)
     else:
         packed = stack(islands)
     return replace(packed, islands=[uv + origin for uv in packed.islands])

@@ -89,7 +89,9 @@ def lay_out(
         warnings.append((-1, _in_place(len(staying), len(free))))
     triangles = [_connected_triangles(island.chart) for island in free]
     upright = _upright(free, jobs, maps)
-    steps = pack_islands(upright, triangles, settings, around)
+    # What markers say stays as they say.
+    turnable = np.array([jobs[island.owner].markers is None for island in free], dtype=bool)
+    steps = pack_islands(upright, triangles, settings, around, turnable)
     packed = yield from part_of(steps, PACKING_FROM, 1 - PACKING_FROM)
     moved = [replace(i, uv=uv) for i, uv in zip(free, packed.islands, strict=True)]
     rounded = iter(in_single_precision(moved))

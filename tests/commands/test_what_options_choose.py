@@ -18,6 +18,7 @@ CHOICES = {
         "--udim 1013": {"tile": 1013},
         "--no-pack": {"pack": False},
         "--pack-around": {"pack_around": True},
+        "--turn-to-fit": {"turn_to_fit": True},
         "--seams existing": {"seams": "existing"},
         "--fill-holes": {"fill_holes": True},
         "--max-shear 1.25": {"max_shear": 1.25},

@@ -7,7 +7,7 @@ import scenes
 from operator_runs import other_values
 
 # Settings of Unwrap alone, which others take as they are.
-UNWRAP = {"seams", "fill_holes", "cut_further", "kind", "aspect", "pack_around"}
+UNWRAP = {"seams", "fill_holes", "cut_further", "kind", "aspect", "pack_around", "turn_to_fit"}
 # Operator, arguments of its `settings`; properties whose settings have other names; settings of no property; what one
 # property decides besides.
 OPERATORS = {

@@ -10,6 +10,7 @@ from omt_uv.pipelines.layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import FIRST_TILE, Settings
 from omt_uv.solver.analysis.facing import SceneAxes
+from omt_uv.solver.canonical.markers import MapMarkers
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import EmptyMeshError
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
@@ -147,3 +148,30 @@ def test_islands_that_stay_are_packed_around_in_their_own_tile(monkeypatch, tile
     assert (margin, size) == (7, 512) and triangles is index
     np.testing.assert_allclose(points, island + 0.5)
     np.testing.assert_allclose(found.islands[0], island + origin)
+
+
+def bar(angle):
+    """A flat strip, ten times as long as wide, turned in its plane."""
+    V, F = meshes.grid(20, 2, 10.0, 1.0)
+    cos, sin = np.cos(angle), np.sin(angle)
+    return triangle_surface(V @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]), F)
+
+
+def test_islands_that_may_be_turned_fill_more():
+    job = UnwrapJob(bar(0.0))
+    upright, turned = (drain(lay_out([job], Settings(turn_to_fit=fit))) for fit in (False, True))
+    assert turned.packing.coverage > 1.5 * upright.packing.coverage
+    np.testing.assert_allclose(upright.corners[0], turned.corners[0])
+
+
+def test_what_markers_say_is_not_turned():
+    flat = meshes.grid(20, 2, 10.0, 1.0)[0][:, :2] @ np.array([[1, 1, -1, -1], [1, -1, -1, 1]])
+    none = np.zeros(0, int)
+    marked = UnwrapJob(bar(0.3), markers=MapMarkers(none, none, flat.argmax(axis=0)))
+    settings = [Settings(boundary="rectangle", turn_to_fit=fit) for fit in (False, True)]
+    upright, fitted = (drain(lay_out([marked], each)) for each in settings)
+    np.testing.assert_array_equal(upright.uv[0], fitted.uv[0])
+    both = [drain(lay_out([UnwrapJob(bar(0.0)), marked], each)) for each in settings]
+    (along, _), (other, _) = (np.linalg.svd(np.diff(one.uv[1][[0, 5]], axis=0))[2] for one in both)
+    assert abs(along @ other) == pytest.approx(1, abs=1e-3) or abs(along @ other) == pytest.approx(0, abs=1e-3)
+    assert both[1].packing.scale > 1.05 * both[0].packing.scale

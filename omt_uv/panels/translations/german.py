@@ -69,6 +69,7 @@ GERMAN: dict[str, str] = {
     "Max Shear": "Max. Scherung",
     "Pack Islands": "Inseln packen",
     "Pack Around": "Herum packen",
+    "Turn to Fit": "Passend drehen",
     "Use Subdivision Surface": "Unterteilungsfläche verwenden",
     "UV Map": "UV-Karte",
     "Factor": "Faktor",

@@ -69,6 +69,7 @@ JAPANESE: dict[str, str] = {
     "Max Shear": "最大せん断",
     "Pack Islands": "アイランドを梱包",
     "Pack Around": "周囲に梱包",
+    "Turn to Fit": "回転して詰める",
     "Use Subdivision Surface": "細分割面を使う",
     "UV Map": "UV マップ",
     "Factor": "倍率",

@@ -1,7 +1,7 @@
 """Islands packed into a square: on a raster, as large as a search finds them to fit, around what has to stay.
 
 Imports solver.errors, solver.mesh and solver.progress.
-Main names: pack, Packing, stack, covered_area, MarginError.
+Main names: pack, pack_turned, Packing, stack, covered_area, MarginError.
 """
 
 from ..lazy import lazy
@@ -14,4 +14,5 @@ __getattr__, __all__ = lazy(
     raster_grid="RasterGrid runs_of",
     shelves="Block blocks_of",
     single_precision="without_rounded_folds",
+    turning="in_smallest_box pack_turned",
 )

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import ConvexHull
 
 from ..analysis.symmetry_plane import MirrorImages
 from ..linalg.minimum_cut import capacities
@@ -20,6 +19,7 @@ from ..mesh.charts import Chart, part_of_chart
 from ..mesh.geometry import cotangent_laplacian, edge_lengths, face_areas
 from ..mesh.topology import pair_keys
 from ..packing.pack_square import pack
+from ..packing.turning import in_smallest_box
 from ..progress import drain
 from ..revolution.profile import harmonic_between
 from .options import COMPACT
@@ -186,19 +186,7 @@ def _laid(charts: Sequence[Chart], maps: Sequence[np.ndarray], up: Up) -> list[n
     """Maps (n_i,2) of charts turned upright, or, without an `up`, as the smallest box around each lies."""
     if up is not None:
         return turn_upright(charts, maps, [up] * len(charts))
-    return [_in_smallest_box(uv) for uv in maps]
-
-
-def _in_smallest_box(uv: np.ndarray) -> np.ndarray:
-    """A map (n,2) turned so that the box around it is smallest: along a side of its convex hull."""
-    # Joggled, since slivers have no hull in double precision.
-    hull = uv[ConvexHull(uv, qhull_options="QJ").vertices]
-    side = np.roll(hull, -1, axis=0) - hull
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    across = np.stack([-side[:, 1], side[:, 0]], axis=1)
-    extents = [np.ptp(hull @ direction.T, axis=0) for direction in (side, across)]
-    best = int(np.argmin(extents[0] * extents[1]))
-    return uv @ np.stack([side[best], across[best]], axis=1)
+    return [in_smallest_box(uv, chart.triangles) for chart, uv in zip(charts, maps, strict=True)]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import MeshError, PinError
 from omt_uv.solver.mesh.charts import Chart
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
 from omt_uv.solver.parameterization import (
     chart_indices,
@@ -206,7 +207,7 @@ def test_outlines_are_as_long_as_the_edges_around_both_sides_of_a_slit():
 
 def search_of(**given):
     fields = {
-        "surface": SimpleNamespace(face_start=np.arange(0, 31, 3)),
+        "surface": triangle_surface(*meshes.grid(5, 1)),
         "faces": None,
         "shear": ShearBound(1.35),
         "target": None,

@@ -14,7 +14,7 @@ from omt_uv.solver.mesh.charts import Chart
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import halfedges, twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.seams import coarse_cut, coarse_surface, cut_tree, growth, limbs, parting, path_graph, rehearsal
+from omt_uv.solver.seams import coarse_cut, coarse_surface, cut_tree, growth, parting, path_graph, rehearsal
 from omt_uv.solver.seams.coarse_cut import CoarseCut
 from omt_uv.solver.seams.options import SearchOptions
 from omt_uv.solver.seams.search import SeamSearch
@@ -173,20 +173,6 @@ def test_crumbs_between_a_cut_and_its_image_join_what_they_share_most_of():
     assert found.sum() == 1 and (found & (one | other)).any()
     far = np.array([set(p.tolist()) == {70, 71} for p in graph.joined])
     np.testing.assert_array_equal(parting._without_crumbs(chart, graph, one, one | far), one | far)
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
-def test_the_smallest_box_lies_along_a_side_of_the_hull(angle):
-    uv = np.array([[0, 0], [4, 0], [4, 1], [0, 1], [2, 0.5]]) @ [
-        [np.cos(angle), np.sin(angle)],
-        [-np.sin(angle), np.cos(angle)],
-    ]
-    found = limbs._in_smallest_box(uv)
-    assert sorted(np.ptp(found, axis=0)) == pytest.approx([1, 4])
-    np.testing.assert_allclose(np.linalg.norm(found[1] - found[2]), 1)
-    # It is turned, not mirrored.
-    a, b = found[1] - found[0], found[3] - found[0]
-    assert a[0] * b[1] - a[1] * b[0] == pytest.approx(4)
 
 
 # What a search and a rehearsal decide.
