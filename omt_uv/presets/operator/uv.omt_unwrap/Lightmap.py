@@ -9,6 +9,7 @@ op.seams = "CHARTS"
 op.fill_holes = False
 op.max_shear = 0.0
 op.pack = True
+op.turn_to_fit = True
 op.margin = 4
 op.texture_size = 1024
 op.uv_layer = "Lightmap"

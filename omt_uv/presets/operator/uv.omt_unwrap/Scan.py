@@ -9,5 +9,6 @@ op.seams = "AUTO"
 op.fill_holes = True
 op.max_shear = 1.35
 op.pack = True
+op.turn_to_fit = False
 op.margin = 8
 op.texture_size = 8192
