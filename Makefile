@@ -7,9 +7,11 @@ export OMT_UV_MODELS ?= $(CURDIR)/../shared/models
 
 .PHONY: demo test check bench papers extension matrix gui repository site venv clean
 
-# Two processes at once, each file in one of them, and no threads of BLAS that would spin beside the other's.
+# Two processes at once, each file in one of them, in the order of tests/conftest.py, and no threads of BLAS that would
+# spin beside the other's. What Python compiles is kept: hundreds of tests begin processes of their own.
 test: $(STAMP)
-	OMP_NUM_THREADS=$${OMP_NUM_THREADS:-1} $(PY) -m pytest -n 2 --dist loadfile
+	env -u PYTHONDONTWRITEBYTECODE PYTHONPYCACHEPREFIX=$(CURDIR)/build/compiled \
+	    OMP_NUM_THREADS=$${OMP_NUM_THREADS:-1} $(PY) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 demo: $(STAMP)
 	$(PY) scripts/pictures/demo.py

@@ -17,6 +17,10 @@ import pytest
 
 ADDON = "bl_ext.user_default.omt_uv"
 FOLDERS = ("blender", "commands", "display", "extension", "operators", "panels", "session")
+# Files of a minute and more.
+LONG = {"test_what_every_function_tells.py", "test_what_is_told_on_wider_runs.py", "test_what_is_told_on_rare_runs.py",
+        "test_what_is_found_on_wider_inputs.py", "test_every_warning_arrives.py", "test_fuzz.py",
+        "test_writes.py"}  # fmt: skip
 STATUS = pytest.StashKey[int]()
 # Where Linux lists what a process holds open.
 TOLD_OPEN = Path("/proc/self/fd")
@@ -55,6 +59,11 @@ def pytest_configure(config):
         return part_of(steps, start, width, stage)
 
     told.Progress.__init__, told.part_of = within, part_within
+
+
+def pytest_collection_modifyitems(items):
+    """What takes longest in one file comes first, so that processes that run side by side end together."""
+    items.sort(key=lambda item: item.path.name not in LONG)
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ stands before a percent sign is a hundred times a share."""
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -19,10 +20,17 @@ SEVERAL = {"is": "are", "has": "have", "was": "were", "its": "their", "vertex": 
 PERCENTS = {"sums", "mean", "deviation", "p"}
 
 
+@functools.cache
+def nodes():
+    """Calls and texts with something put in, by their files."""
+    return {path: [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call | ast.JoinedStr)]
+            for path in SOURCES}  # fmt: skip
+
+
 def texts():
     """Every call that counts: the file, the line, and both texts."""
-    for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text())):
+    for path, those in nodes().items():
+        for node in those:
             name = getattr(node, "func", None) and getattr(node.func, "id", getattr(node.func, "attr", ""))
             if name in COUNTING and all(isinstance(a, ast.Constant) for a in node.args[1:3]) and len(node.args) > 2:
                 yield f"{path.relative_to(ROOT)}:{node.lineno}", node.args[1].value, node.args[2].value
@@ -49,8 +57,8 @@ def test_one_thing_is_one_and_several_are_several(where, one, many):
 
 def percents():
     """Numbers that stand before a percent sign: the place, and what is written there."""
-    for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text())):
+    for path, those in nodes().items():
+        for node in those:
             if isinstance(node, ast.JoinedStr):
                 for value, after in zip(node.values, node.values[1:], strict=False):
                     if (
@@ -78,8 +86,8 @@ ABOUT_ALONE = {"names", "obj.name", "options.input", "options.output", "path"}
 def put_in():
     """Values that are put into texts: the place, what is written there, whether a colon follows at once at the
     beginning, and whether it is quoted."""
-    for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text())):
+    for path, those in nodes().items():
+        for node in those:
             if isinstance(node, ast.JoinedStr):
                 for k, value in enumerate(node.values):
                     if isinstance(value, ast.FormattedValue):

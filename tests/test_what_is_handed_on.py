@@ -7,6 +7,7 @@ chart forgets, an aspect that its coarse mesh does not know.
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,22 +30,29 @@ LEFT_OUT = {
     ("_refined", "Signature"): (("floor",), "costs of single points have none"),
 }
 
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))}
+
+@functools.cache
+def trees() -> list[ast.Module]:
+    """The sources; not before a test asks for them."""
+    return [ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))]
 
 
 def _is_dataclass(node: ast.AST) -> bool:
     return isinstance(node, ast.ClassDef) and any("dataclass" in ast.unparse(d) for d in node.decorator_list)
 
 
-CLASSES = {node.name: node for tree in TREES.values() for node in ast.walk(tree) if _is_dataclass(node)}
+@functools.cache
+def classes() -> dict[str, ast.ClassDef]:
+    """Dataclasses by their names."""
+    return {node.name: node for tree in trees() for node in ast.walk(tree) if _is_dataclass(node)}
 
 
 def fields_of(name: str) -> list[str]:
     """Fields of a dataclass in the order in which it takes them."""
-    above = [field for base in CLASSES[name].bases if ast.unparse(base) in CLASSES for field in fields_of(base.id)]
+    above = [field for base in classes()[name].bases if ast.unparse(base) in classes() for field in fields_of(base.id)]
     own = [
         line.target.id
-        for line in CLASSES[name].body
+        for line in classes()[name].body
         if isinstance(line, ast.AnnAssign) and "ClassVar" not in ast.unparse(line.annotation)
     ]
     return list(dict.fromkeys([*above, *own]))
@@ -67,17 +75,17 @@ def given(call: ast.Call, within: ast.FunctionDef) -> dict[str, ast.expr]:
 def left_out() -> Iterator[tuple[str, str, set[str]]]:
     """Function, class that it makes, and the fields that this has in common with a parameter and does not get, though
     others come from there."""
-    for tree in TREES.values():
+    for tree in trees():
         for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
             every = [*function.args.args, *function.args.kwonlyargs]
             kinds = {a.arg: ast.unparse(a.annotation).partition(" |")[0] for a in every if a.annotation}
             for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
-                if not isinstance(call.func, ast.Name) or call.func.id not in CLASSES:
+                if not isinstance(call.func, ast.Name) or call.func.id not in classes():
                     continue
                 if any(one.arg is None for one in call.keywords):
                     continue
                 gets = given(call, function)
-                for name in {n for n, kind in kinds.items() if kind in CLASSES}:
+                for name in {n for n, kind in kinds.items() if kind in classes()}:
                     if any(ast.unparse(value) == f"{name}.{field}" for field, value in gets.items()):
                         both = set(fields_of(kinds[name])) & set(fields_of(call.func.id))
                         yield function.name, call.func.id, both - gets.keys()
@@ -110,13 +118,13 @@ def _mentions(function: ast.FunctionDef, name: str) -> bool:
 
 def silent() -> Iterator[tuple[str, str, str]]:
     """Function, class that it makes with warnings of its own, and a parameter that has some, of which it takes none."""
-    for tree in TREES.values():
+    for tree in trees():
         for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
             every = [*function.args.args, *function.args.kwonlyargs]
             kinds = {a.arg: ast.unparse(a.annotation).partition(" |")[0] for a in every if a.annotation}
-            of = [n for n, kind in kinds.items() if kind in CLASSES and "warnings" in fields_of(kind)]
+            of = [n for n, kind in kinds.items() if kind in classes() and "warnings" in fields_of(kind)]
             for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
-                if not isinstance(call.func, ast.Name) or call.func.id not in CLASSES:
+                if not isinstance(call.func, ast.Name) or call.func.id not in classes():
                     continue
                 told = given(call, function).get("warnings")
                 # Who is given all warnings leaves to its caller whose they are.

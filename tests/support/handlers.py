@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import functools
 import importlib
 import inspect
 from collections.abc import Iterator
@@ -30,8 +31,13 @@ class Handler(NamedTuple):
     around: ast.Try
 
 
-def handlers() -> Iterator[Handler]:
+@functools.cache
+def handlers() -> tuple[Handler, ...]:
     """All handlers of the package, by module and function."""
+    return tuple(_found())
+
+
+def _found() -> Iterator[Handler]:
     for module in modules():
         tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8"))
         counts: dict[str, int] = {}

@@ -9,6 +9,7 @@ import functools
 import importlib
 import inspect
 import itertools
+import math
 import os
 import pkgutil
 import re
@@ -131,32 +132,58 @@ def figures(found) -> np.ndarray:
     """Two figures of arrays: of their sizes, shapes and kinds of numbers, and of where in them what lies."""
     size = place = 0.0
     for k, leaf in enumerate(found):
-        x = np.nan_to_num(_fewer(leaf).astype(complex), nan=7.0, posinf=9.0, neginf=-9.0)
-        x = np.concatenate([x.real, x.imag]) if leaf.dtype.kind == "c" else x.real
+        # Most are single numbers.
+        single = not leaf.ndim and leaf.dtype.kind in "fiub"
+        count, total, along = (_single if single else _several)(leaf, 0.61 * k)
+        own = 1 + 0.5 * math.sin(k)
+        size += own * (math.log(total) if total > 1e-12 else 0.0) + 0.01 * count + _kind(leaf)
+        place += own * along / total if total > 1e-12 else 0.0
+    return np.array([size, place])
+
+
+def _single(leaf: np.ndarray, turn: float) -> tuple[int, float, float]:
+    """As `_several` of a single number."""
+    value = float(leaf)
+    value = 7.0 if math.isnan(value) else value if abs(value) < HUGE else math.copysign(9.0, value)
+    return 1, abs(value), math.cos(0.3 + turn) * value
+
+
+def _several(leaf: np.ndarray, turn: float) -> tuple[int, float, float]:
+    """How many numbers stand for an array, the sum of their sizes, and that of the numbers by where they stand."""
+    x = _fewer(leaf)
+    if x.dtype.kind == "c":
+        x = np.concatenate([x.real, x.imag])
+    total = np.abs(x).sum()
+    if not total < HUGE:
+        x = np.nan_to_num(x, nan=7.0, posinf=9.0, neginf=-9.0)
         # What stands for infinite would leave nothing of all else.
         x = np.where(np.abs(x) < HUGE, x, 9.0 * np.sign(x))
         total = np.abs(x).sum()
-        weight = np.cos(0.3 + 1.7 * np.arange(len(x)) + 0.61 * k)
-        own = 1 + 0.5 * np.sin(k)
-        size += own * (np.log(total) if total > 1e-12 else 0.0) + 0.01 * len(x) + _kind(leaf)
-        place += own * (weight @ x) / total if total > 1e-12 else 0.0
-    return np.array([size, place])
+    even, odd = _waves()
+    return len(x), total, math.cos(turn) * (even[: len(x)] @ x) - math.sin(turn) * (odd[: len(x)] @ x)
+
+
+@functools.cache
+def _waves() -> tuple[np.ndarray, np.ndarray]:
+    """Cosine and sine by which numbers count where they stand."""
+    angle = 0.3 + 1.7 * np.arange(2 * SAMPLED)
+    return np.cos(angle), np.sin(angle)
 
 
 def _fewer(leaf: np.ndarray) -> np.ndarray:
     """The numbers of an array in a row; of many, as of a picture, sums of some each."""
-    flat = np.asarray(leaf).ravel()
+    flat = leaf.ravel().astype(complex if leaf.dtype.kind == "c" else float, copy=False)
     many = 1 + flat.size // SAMPLED
     if many == 1:
         return flat
     with np.errstate(over="ignore"):
-        return np.add.reduceat(np.nan_to_num(flat.astype(complex)), np.arange(0, flat.size, many))
+        return np.add.reduceat(np.nan_to_num(flat), np.arange(0, flat.size, many))
 
 
 def _kind(leaf: np.ndarray) -> float:
     """A figure of the kind of numbers that an array holds, and of its shape: 0 for a row of numbers of full length."""
-    single = 0.23 * (leaf.dtype == np.float32)
-    return KINDS.get(leaf.dtype.kind, 0.0) + single + sum(0.03 * axis * n for axis, n in enumerate(leaf.shape))
+    kind = KINDS.get(leaf.dtype.kind, 0.23 * (leaf.dtype == np.float32))
+    return kind + sum(0.03 * axis * n for axis, n in enumerate(leaf.shape)) if leaf.ndim > 1 else kind
 
 
 def same(a, b) -> bool:
