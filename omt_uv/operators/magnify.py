@@ -173,11 +173,11 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
             settings = self.settings(source)
             steps = magnify_several(several, settings) if len(several) > 1 else magnify(regions, settings)
             result = yield from run.aside(steps)
-        if picture is not None and (self.detail or self.image_size):
-            picture = self._detailed(picture, regions, result)
-        elif picture is not None:
-            straight = images.has_straight_alpha(images.named(self.image))
-            picture = warped_picture(picture, regions, result, self.margin, straight)
+            if picture is not None and (self.detail or self.image_size):
+                picture = self._detailed(picture, regions, result)
+            elif picture is not None:
+                straight = images.has_straight_alpha(images.named(self.image))
+                picture = warped_picture(picture, regions, result, self.margin, straight)
         return objects, replace(result, warnings=[*warnings, *result.warnings]), picture
 
     def _weights(self, context: bpy.types.Context, pairs):

@@ -378,3 +378,17 @@ def test_further_regions_and_detail_over_the_region():
     state = scenes.state(obj)
     text = scenes.error_of(bpy.ops.uv.omt_magnify, **{**given, "further": "right"})
     assert "eyes=3" in text and scenes.state(obj) == state
+
+
+def test_a_detail_without_a_place_is_told_in_a_line_and_not_by_a_traceback():
+    obj = scenes.bump(8, 8)
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    # Single vertices: no face is in the region.
+    obj.vertex_groups.new(name="few").add([20, 44], 0.2, "REPLACE")
+    for name in ("map", "fine"):
+        bpy.data.images.new(name, 16, 16)
+    state = scenes.state(obj)
+    given = {"source": "UV", "weight_group": "few", "factor": 1.5, "image": "map", "detail": "fine"}
+    text = scenes.error_of(bpy.ops.uv.omt_magnify, **given)
+    assert text == "Error: Detail Image: No face with UVs is in the region. Paint it, or give the box.\n"
+    assert scenes.state(obj) == state

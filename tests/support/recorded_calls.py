@@ -39,6 +39,8 @@ CALLED_BY_BLENDER = {"cancel", "check", "description", "draw", "execute", "invok
 # Numbers in texts, and paths, which differ from machine to machine.
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PATH = re.compile(r"\S*/\S*")
+# Where a line of a source stands, which any change above it moves.
+LINE = re.compile(r"(?<=/ line )\d+")
 
 
 class Call(NamedTuple):
@@ -90,7 +92,7 @@ def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndar
     if value is None or isinstance(value, Path):
         yield np.asarray(-1.0)
     elif isinstance(value, str):
-        text = PATH.sub("/", value)
+        text = LINE.sub("#", PATH.sub("/", value))
         yield np.frombuffer(NUMBER.sub("#", text).encode(), np.uint8).astype(float)
         yield np.array([float(word) for word in NUMBER.findall(text)])
     elif isinstance(value, (bytes, bytearray)):
