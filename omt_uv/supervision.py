@@ -12,13 +12,14 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+from .temporary import own_folder, remove_of
 
 PROGRAM = "omt_uv"
 
@@ -37,9 +38,6 @@ OWN = {0, FAILURE, USAGE, MEMORY, DEFECT, INTERRUPTED, UNREAD}
 GIGABYTE = 10**9
 # Says to a process that it is the child, and which folder for temporary files the parent has made for it.
 MARK = "OMT_UV_CHILD"
-# A file in that folder with the number of the parent: no other folder is ever removed.
-OWNER = "omt_uv_parent"
-FOLDER = "omt_uv_"
 # Where what a watched child prints is kept.
 STREAMS = ("printed.txt", "errors.txt")
 MEMORY_IS_LIMITED = sys.platform.startswith("linux")
@@ -91,15 +89,8 @@ def _end_with_parent(folder: Path, parent: int, heard: Callable[[bytes], object]
     while data := os.read(0, 1 << 16):
         if heard is not None:
             heard(data)
-    _remove_own(folder, parent)
+    remove_of(folder, parent)
     os._exit(CRASH)
-
-
-def _remove_own(folder: Path, parent: int) -> None:
-    """Remove the folder that a parent has made for its child, and no other."""
-    with suppress(OSError):
-        if folder.name.startswith(FOLDER) and (folder / OWNER).read_text() == str(parent):
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 def leave(status: int) -> None:
@@ -213,13 +204,12 @@ def begun(errand: Errand, captured: bool = False, answers: bool = False) -> Iter
 
     captured : what it prints goes to files there; answers : what it prints on the standard output is read by us
     """
-    with tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True) as folder, ExitStack() as stack:
-        (Path(folder) / OWNER).write_text(str(os.getpid()))
-        places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
-        out, err = (stack.enter_context(open(Path(folder) / n, "wb")) if captured else None for n in STREAMS)
+    with own_folder() as folder, ExitStack() as stack:
+        places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
+        out, err = (stack.enter_context(open(folder / n, "wb")) if captured else None for n in STREAMS)
         child = subprocess.Popen(
             errand.words,
-            env={**os.environ, **places, MARK: folder},
+            env={**os.environ, **places, MARK: str(folder)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE if answers else out,
             stderr=err,
@@ -227,7 +217,7 @@ def begun(errand: Errand, captured: bool = False, answers: bool = False) -> Iter
             start_new_session=True,
         )
         try:
-            yield child, Path(folder)
+            yield child, folder
         finally:
             assert child.stdin is not None
             # It may have gone, with words to it still unread.

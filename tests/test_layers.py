@@ -21,7 +21,8 @@ ARROWS: dict[str, str] = {
     "settings": "",
     "errors": "",
     "links": "",
-    "supervision": "",
+    "temporary": "",
+    "supervision": "temporary",
     # The names of the front door are looked up in solver.api when they are used.
     "solver": "",
     "solver.mesh": "solver",
@@ -96,12 +97,12 @@ ARROWS: dict[str, str] = {
     "blender.volumes": "errors solver solver.flows solver.volumes pipelines.volumes blender",
     "files.formats": "solver",
     "files.in_place": "errors solver",
-    "files": "errors supervision solver blender files.formats files.in_place",
+    "files": "errors temporary supervision solver blender files.formats files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "display.textures": "solver solver.maps pipelines pipelines.measuring display",
     "session": "errors settings solver solver.mesh solver.maps solver.editing solver.parameterization pipelines "
     "blender",
-    "batch": "errors supervision solver",
+    "batch": "errors temporary supervision solver",
     "commands": "errors supervision remedies settings solver solver.mesh solver.comparison solver.cutting solver.globe "
     "solver.parameterization pipelines pipelines.measuring pipelines.regions pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "

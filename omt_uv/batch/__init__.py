@@ -1,6 +1,6 @@
 """A command over many files: a child process for each, a manifest of what was done, a table and a page of the results.
 
-Imports errors, supervision and lazy names; no Blender. numpy, rich, distributed and pyarrow when they are used.
+Imports errors, temporary, supervision and lazy names; no Blender. numpy, rich, distributed, pyarrow when they are used.
 Main names: BatchPlan, FileTask, Manifest, carry_out, page_of, summary_of, table_of, tasks_of.
 """
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import socket
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..supervision import PROGRAM, Errand, Outcome
+from ..temporary import own_folder
 from .plan import BatchPlan, FileTask, hash_of, words_of
 
 ERROR = f"{PROGRAM}: error: "
@@ -47,10 +47,10 @@ def run_task(plan: BatchPlan, task: FileTask, start: Sequence[str], watched: Cal
     # Read before the run: a file that changes meanwhile is done again.
     input_hash = hash_of(task.path)
     preview = plan.beside(".previews") / f"{task.name}.png" if plan.previews else None
-    with tempfile.TemporaryDirectory(prefix="omt_uv_batch_") as folder:
+    with own_folder() as folder:
         places: dict[str, Path] = {}
         if plan.reports:
-            places["report"] = Path(folder) / "report.json"
+            places["report"] = folder / "report.json"
         if preview is not None:
             places["preview"] = preview
         for path in (preview, task.output):

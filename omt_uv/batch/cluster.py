@@ -11,13 +11,13 @@ import contextlib
 import json
 import queue
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..supervision import Errand, Outcome, watch
+from ..temporary import own_folder
 from .child import Record, hash_of, run_task
 from .plan import BatchError, BatchPlan, FileTask, kept, words_of
 
@@ -195,8 +195,7 @@ def run_remote(text: str, data: bytes | None) -> tuple[str, dict[str, bytes]]:
     start = started_by()
     if data is None:
         return json.dumps(asdict(run_task(plan, task, start, _alone))), {}
-    with tempfile.TemporaryDirectory(prefix="omt_uv_batch_") as folder:
-        here = Path(folder)
+    with own_folder() as here:
         name = Path(task.name).name
         (here / "in").mkdir()
         (here / "in" / name).write_bytes(data)

@@ -1,6 +1,6 @@
 """Files in and out of Blender: meshes in several formats with all their digits, and images as arrays.
 
-Imports errors, supervision, blender and in_place.
+Imports errors, temporary, supervision, blender and in_place.
 Main names: meshes.load, saving.save, saving.save_uvs, verified.staged, images.load, images.save, pixels_of.
 """
 

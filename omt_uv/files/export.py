@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import bmesh
 import numpy as np
 
 from ..blender.versions import known_options, settle_context
+from ..temporary import own_folder
 from .in_place import glb_data, gltf
 from .meshes import AXES
 from .obj_materials import name_materials
@@ -259,9 +259,9 @@ def _name_source() -> None:
     name = bpy.data.filepath
     if name.encode(errors="replace").decode() == name:
         return
-    with tempfile.TemporaryDirectory(prefix="omt_uv_") as folder:
+    with own_folder() as folder:
         # From here on it is of that name, and finds its images from there.
-        bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / "source.blend"), check_existing=False)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "source.blend"), check_existing=False)
 
 
 _WRITERS: dict[str, Callable[[Path, Objects, bool], list[str]]] = {

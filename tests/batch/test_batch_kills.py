@@ -160,3 +160,21 @@ def test_killed_batches_workers_and_schedulers_go_on(work):
             process.kill()
             process.wait()
     check(work, flights)
+
+
+@pytest.mark.parametrize("shared", [False, True], ids=["apart", "shared"])
+def test_a_killed_batch_leaves_no_folders_after_the_next(work, monkeypatch, shared):
+    place = work.root / "temporary"
+    place.mkdir()
+    monkeypatch.setenv("TMPDIR", str(place))
+    process = batch(work, shared=shared)
+    for _ in range(2000):
+        if len(list(place.iterdir())) > 4:
+            break
+        Event().wait(0.01)
+    process.kill()
+    process.wait()
+    # Its children take their folders along; those of the batch itself stay.
+    assert list(place.glob("omt_uv_*"))
+    assert batch(work, shared=shared).wait(120) == 0
+    assert not list(place.iterdir())
