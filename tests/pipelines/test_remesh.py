@@ -62,6 +62,15 @@ def test_counts_that_are_none_are_refused(settings):
         series(*meshes.icosphere(1), **settings)
 
 
+@pytest.mark.parametrize("ratio", [-1.0, 0.0, 1.0, 2.0, np.nan])
+def test_what_one_level_does_not_use_refuses_nothing(ratio):
+    V, F = meshes.icosphere(2)
+    found, plain = series(V, F, count=40, ratio=ratio), series(V, F, count=40)
+    assert np.array_equal(found.levels[0].positions, plain.levels[0].positions)
+    with pytest.raises(CountError, match="ratio between 0 and 1"):
+        series(V, F, count=40, levels=2, ratio=ratio)
+
+
 def test_errors_say_the_level():
     with pytest.raises(CountError, match=r"^LOD1: "):
         series(*meshes.icosphere(2), count=20, levels=2, ratio=0.1)

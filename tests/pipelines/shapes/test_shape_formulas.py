@@ -135,6 +135,21 @@ def test_what_is_linear_is_carried_to_cells_exactly():
         assert any(n[v] in every[q] for q in f[start[mesh.corner_vertex == v]])
 
 
+@pytest.mark.parametrize(("kind", "shape"), [("FLOAT", ()), ("FLOAT2", (2,)), ("FLOAT_VECTOR", (3,)), ("INT", ())])
+@pytest.mark.parametrize("count", [0, 1])
+def test_layers_of_marks_keep_their_shapes_where_no_edge_has_any(kind, shape, count):
+    surface = quads()
+    values = np.ones((count, *shape), np.int32 if kind == "INT" else np.float32)
+    none = np.zeros(count, bool)
+    marks = Marks(
+        surface.corner_vertex[None, :2][:count], none, none, np.zeros(count), (Layer("x", "EDGE", kind, values),)
+    )
+    found, _ = carried_with(surface, marks=marks)
+    (layer,) = found.marks.layers
+    assert layer.values.shape == (len(found.marks.edges), *shape) and layer.values.dtype == values.dtype
+    assert len(found.marks.edges) and layer.values.any() == (count > 0)
+
+
 def test_marks_are_on_the_pieces_of_the_edges_that_had_them_and_cells_end_at_seams():
     surface = quads()
     edges = {}
