@@ -62,6 +62,7 @@ ROWS: dict = {
         ("Seamed", CUT, None, {"cut_further": True}),
         ("Smooth", DRAFT, "--subdivision off", {"use_subdivision": False}),
         ("Cubes", DRAFT, None, {"pack_around": True}),
+        ("Closed", CHARTS, None, {"turn_to_fit": True}),
     ]),
     "refine": ("uv.omt_refine", [
         ("Closed", REFINED, None, {"balance": 0.75}),

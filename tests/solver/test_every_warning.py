@@ -698,8 +698,11 @@ def sheared(patch):
 @says("solver/errors.py", "kept before its seams were done")
 @says("solver/errors.py", "no seams were found that would pay")
 def not_searched(patch):
-    last = SimpleNamespace(charts=[0], searched=[0], mean=np.array([2.0]), area=np.ones(1), memory={}, cuts=0, maps=[])
-    search, begin = SimpleNamespace(shear=ShearBound(1.5), memory={}), "An island shears 2 in the mean, above 1.5: "
+    last = SimpleNamespace(
+        charts=[0], searched=[0], mean=np.array([2.0]), bound=1.5, area=np.ones(1), memory={}, cuts=0, maps=[]
+    )
+    search = SimpleNamespace(shear=ShearBound(1.5), memory={}, lenience_of=lambda charts: np.ones(len(charts)))
+    begin = "An island shears 2 in the mean, above 1.5: "
     found = "no seams were found that would pay; allow for more shear, or mark some yourself"
     ended = SimpleNamespace(is_asked=True)
     yield shear_bound._result(last, search, (), EarlyEnd()).warnings, [begin + found]
