@@ -10,7 +10,7 @@ import numpy as np
 from ...solver.errors import EmptyMeshError, MeshError, plural
 from ...solver.mesh.geometry import face_areas, halfedge_lengths
 from ...solver.mesh.surface import Surface
-from ...solver.mesh.topology import graph_components, halfedges
+from ...solver.mesh.topology import graph_components, halfedges, triangle_parts
 from ...solver.progress import Progress, Steps, part_of
 from ...solver.registration.charts.chart_maps import register_charts
 from ...solver.registration.domains import CHARTS
@@ -158,8 +158,7 @@ def largest_part(surface: Surface, name: str) -> MatchedPart:
         raise EmptyMeshError(f"The {name} has no faces", "Choose a mesh with faces")
     if not np.isfinite(surface.positions[triangles]).all():
         raise MeshError(f"Coordinates of the {name} are not finite numbers", "Clear or fix its scale")
-    tail, head = halfedges(triangles)
-    part = graph_components(tail, head, len(surface.positions))[1][triangles[:, 0]]
+    part = triangle_parts(triangles, len(surface.positions))
     area = np.bincount(part, face_areas(surface.positions, triangles))
     rows = np.flatnonzero(part == area.argmax())
     used, inverse = np.unique(triangles[rows], return_inverse=True)
@@ -177,8 +176,7 @@ def _seams(surface: Surface, part: MatchedPart) -> np.ndarray:
 
 def _count_parts(surface: Surface) -> int:
     triangles = surface.corner_vertex[surface.triangles]
-    part = graph_components(*halfedges(triangles), len(surface.positions))[1]
-    return len(np.unique(part[triangles[:, 0]]))
+    return len(np.unique(triangle_parts(triangles, len(surface.positions))))
 
 
 def _back(

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..mesh.closest_point import spread_points
 from ..mesh.geometry import cross3, face_areas, face_normals
-from ..mesh.topology import graph_components, halfedges
+from ..mesh.topology import triangle_parts
 from .saliency import unit_size
 
 # Buffers; each one is two directions.
@@ -91,7 +91,7 @@ def looks_out(hidden: np.ndarray, area: np.ndarray, part: np.ndarray) -> np.ndar
 
 def outside_out(positions: np.ndarray, triangles: np.ndarray, hidden: np.ndarray) -> np.ndarray:
     """Triangles (m,3), those of parts turned over that clearly look inwards; hidden (2,m) : see `hidden_sides`."""
-    part = _parts(triangles, len(positions))
+    part = triangle_parts(triangles, len(positions))
     inward = looks_out(hidden[::-1], face_areas(unit_size(positions, triangles), triangles), part)[part]
     return np.where(inward[:, None], triangles[:, [0, 2, 1]], triangles)
 
@@ -160,11 +160,6 @@ def _visible(seen: np.ndarray, slant: np.ndarray, owner: np.ndarray) -> tuple[np
 
 def _outer(hidden: np.ndarray, area: np.ndarray, triangles: np.ndarray, n: int) -> np.ndarray:
     """Of (2,m) the row, by component, that is less hidden in the mean over the areas (m,)."""
-    label = _parts(triangles, n)
+    label = triangle_parts(triangles, n)
     mean = np.stack([np.bincount(label, area * h) for h in hidden])
     return hidden[(mean[1] < mean[0]).astype(int)[label], np.arange(len(area))]
-
-
-def _parts(triangles: np.ndarray, n: int) -> np.ndarray:
-    """The number (m,) of the connected part that each triangle (m,3) of n vertices is in."""
-    return graph_components(*halfedges(triangles), n)[1][triangles[:, 0]]

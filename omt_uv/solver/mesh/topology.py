@@ -242,6 +242,11 @@ def graph_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndar
     )
 
 
+def triangle_parts(triangles: np.ndarray, n: int) -> np.ndarray:
+    """The number (m,) of the connected part that each triangle (m,3) of n vertices is in; some may be those of none."""
+    return graph_components(*halfedges(triangles), n)[1][triangles[:, 0]]
+
+
 def edge_runs(ends: np.ndarray) -> np.ndarray:
     """The run (e,) that each of the edges (e,2) between nodes, which may have any numbers, hangs together with."""
     nodes, end = np.unique(ends, return_inverse=True)

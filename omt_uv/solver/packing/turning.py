@@ -38,7 +38,7 @@ def pack_turned(
     large = may & (areas >= LARGE * areas.sum())
     best, most = boxed, 0.0
     count = (ANGLES_ALONE if len(islands) == 1 else ANGLES) if large.any() else 0
-    for k, angle in enumerate(np.arange(count) * (np.pi / 2 / max(count, 1))):
+    for k, angle in enumerate(np.linspace(0, np.pi / 2, count, endpoint=False)):
         turned = [_turned(uv, angle) if is_large else uv for uv, is_large in zip(boxed, large, strict=True)]
         trying = pack(turned, triangles, margin, texture_size, around, roughly=True)
         scale = (yield from part_of(trying, TRYING * k / count, TRYING / count)).scale

@@ -12,7 +12,7 @@ from ..cutting.disk_charts import SEAMS
 from ..errors import CUT_FURTHER, percent, plural
 from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
-from ..mesh.topology import graph_components
+from ..mesh.topology import triangle_parts
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
 
@@ -45,9 +45,8 @@ class ShearBound:
     def lenience(self, surface: Surface, faces: np.ndarray | None) -> np.ndarray:
         """The power (f,) of the bound that every polygon may shear: more than 1 for small parts of the polygons
         `faces` (f,) bool of a surface, all by default."""
-        triangles, vertices = surface.corner_vertex[surface.triangles], len(surface.positions)
-        one, other = np.concatenate([triangles[:, :2], triangles[:, 1:]]).T
-        part = graph_components(one, other, vertices)[1][triangles[:, 0]]
+        triangles = surface.corner_vertex[surface.triangles]
+        part = triangle_parts(triangles, len(surface.positions))
         chosen = 1.0 if faces is None else faces[surface.triangle_face]
         area = np.bincount(part, chosen * face_areas(surface.positions, triangles))
         small = area < SMALL_PART * area.sum()

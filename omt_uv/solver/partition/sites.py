@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..errors import CountError
 from ..mesh.closest_point import random_points
 from ..mesh.geometry import face_areas, face_normals
-from ..mesh.topology import graph_components, halfedges
+from ..mesh.topology import triangle_parts
 
 # Samples for every site, and rounds of k-means.
 SAMPLES = 40
@@ -41,8 +41,7 @@ def inner(barycentric: np.ndarray) -> np.ndarray:
 
 def parts(triangles: np.ndarray, n: int) -> np.ndarray:
     """The part (m,), from 0 up, of every triangle (m,3) of n vertices."""
-    label = graph_components(*halfedges(triangles), n)[1][triangles[:, 0]]
-    return np.unique(label, return_inverse=True)[1].ravel()
+    return np.unique(triangle_parts(triangles, n), return_inverse=True)[1].ravel()
 
 
 def allot(mass: np.ndarray, count: int) -> np.ndarray:
