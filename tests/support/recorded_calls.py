@@ -41,8 +41,8 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PATH = re.compile(r"\S*/\S*")
 # Where a line of a source stands, which any change above it moves.
 LINE = re.compile(r"(?<=/ line )\d+")
-# When a file was written, in nanoseconds.
-TIME = re.compile(r"\b\d{19}\b")
+# The size of a file, which for a .blend differs from run to run, and when it was written, in nanoseconds.
+WRITTEN = re.compile(r"\b\d+ \d{19}\b")
 
 
 class Call(NamedTuple):
@@ -94,7 +94,7 @@ def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndar
     if value is None or isinstance(value, Path):
         yield np.asarray(-1.0)
     elif isinstance(value, str):
-        text = TIME.sub("#", LINE.sub("#", PATH.sub("/", value)))
+        text = WRITTEN.sub("#", LINE.sub("#", PATH.sub("/", value)))
         yield np.frombuffer(NUMBER.sub("#", text).encode(), np.uint8).astype(float)
         yield np.array([float(word) for word in NUMBER.findall(text)])
     elif isinstance(value, (bytes, bytearray)):
