@@ -154,7 +154,7 @@ def weld_split_vertices(reading: Reading) -> Reading:
         uv[surface.corner_vertex] = reading.uv
         key = np.concatenate([key, uv], axis=1)
     same = first_of(places(key))
-    return replace(reading, surface=with_joined_vertices(surface, same))
+    return replace(reading, surface=with_joined_vertices(surface, same), was_split=True)
 
 
 def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:

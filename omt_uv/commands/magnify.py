@@ -176,7 +176,7 @@ def _regions(named: list[tuple[str, float]], pairs: list) -> tuple[list, list[tu
         weights, texts = named_weights(pairs, name)
         told += texts
         parts = [
-            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.axes, r.subdivision)
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.axes, r.subdivision, r.was_split)
             for (_, r), w in zip(pairs, weights, strict=True)
         ]
         found.append(NamedRegion(name, factor, tuple(parts)))

@@ -70,7 +70,7 @@ class UnwrapJob:
         to keep free of cuts; target : density and region of its triangles, their own areas by default. Targets of
         several surfaces are relative to each other; subdivision : the modifier on whose surface areas shall be right
     axes : how the surface stands in the scene; uv : UVs (c,2) that its corners have, if any
-    markers : vertices that fix the turn and the corners of its maps
+    markers : vertices that fix the turn and the corners of its maps; was_split : see `Reading`
     """
 
     surface: Surface
@@ -82,6 +82,7 @@ class UnwrapJob:
     axes: SceneAxes = Z_UP
     uv: np.ndarray | None = None
     markers: MapMarkers | None = None
+    was_split: bool = False
 
     @staticmethod
     def of(
@@ -93,7 +94,15 @@ class UnwrapJob:
         """The job to unwrap what was read, for the areas of the surface of a modifier, or for its own."""
         r = reading
         return UnwrapJob(
-            r.surface, r.faces, r.pins, avoid, subdivision=subdivision, axes=r.axes, uv=r.uv, markers=markers
+            surface=r.surface,
+            faces=r.faces,
+            pins=r.pins,
+            avoid=avoid,
+            subdivision=subdivision,
+            axes=r.axes,
+            uv=r.uv,
+            markers=markers,
+            was_split=r.was_split,
         )
 
 

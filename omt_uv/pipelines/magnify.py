@@ -61,6 +61,7 @@ class Region:
     kind: str = "vertex"
     axes: SceneAxes = Z_UP
     subdivision: SubdivisionModifier | None = None
+    was_split: bool = False
 
     def of_triangles(self, rows: np.ndarray) -> np.ndarray:
         """Weights (k,) of some triangles (k,) of the surface: those of their polygons."""
@@ -188,6 +189,7 @@ def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
                 target=Target(full, inside),
                 subdivision=region.subdivision,
                 axes=region.axes,
+                was_split=region.was_split,
             )
         )
     if settings.boundary == "own":

@@ -18,7 +18,8 @@ from ..solver.subdivision.modifier import SubdivisionModifier
 class Reading:
     """A surface, the polygons to work on (f,) bool, and of a UV layer, if there is one, the UVs (c,2) float32 and
     which of them are pinned (c,) bool; the Subdivision Surface modifier of the object, if it has one; and how it
-    stands in the scene."""
+    stands in the scene; and whether its vertices were split by a file format, so that sides that lie on one another are
+    one."""
 
     surface: Surface
     faces: np.ndarray
@@ -26,6 +27,7 @@ class Reading:
     pinned: np.ndarray | None
     subdivision: SubdivisionModifier | None = None
     axes: SceneAxes = Z_UP
+    was_split: bool = False
 
     @property
     def all_pins(self) -> CornerPins | None:

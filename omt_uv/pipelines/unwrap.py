@@ -13,11 +13,11 @@ from scipy.sparse.csgraph import connected_components
 from ..settings import Settings
 from ..solver.analysis.facing import Y_UP, SceneAxes
 from ..solver.canonical.markers import MapMarkers
-from ..solver.errors import MERGING, MeshError, plural
+from ..solver.errors import DISSOLVE, MERGING, MeshError, plural
 from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import signed_areas, turned_by
-from ..solver.mesh.repair import joined_vertices
+from ..solver.mesh.repair import FlatTriangles, flat_triangles, joined_vertices
 from ..solver.mesh.surface import side_ends, turned_surface, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
 from ..solver.parameterization.options import UnwrapOptions
@@ -59,10 +59,12 @@ def lay_out(
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
     as_they_stand, jobs = jobs, [_set_up(job) for job in jobs]
+    whole, (jobs, flat) = jobs, _without_flat(jobs)
     given, prepare = jobs, {"charts": _with_charts, "auto": _joined}.get(settings.seams, _as_it_is)
     prepared = [prepare(index, job) for index, job in enumerate(jobs)]
     jobs = [job for job, _ in prepared]
-    warnings = [(index, warning) for index, (_, warning) in enumerate(prepared) if warning]
+    warnings = [(index, _lie_flat(len(one.polygons))) for index, one in enumerate(flat) if len(one.polygons)]
+    warnings += [(index, warning) for index, (_, warning) in enumerate(prepared) if warning]
     share = PACKING_FROM / len(jobs)
     cuts = yield from _cut_together(jobs, options)
     for index, job in enumerate(jobs):
@@ -84,7 +86,7 @@ def lay_out(
     staying = [island for island, stays in zip(mapped, pinned, strict=True) if stays]
     around = []
     if settings.pack_around:
-        around = [(i.uv, i.chart.triangles) for i in staying] + [x for job in jobs for x in _beside(job)]
+        around = [(i.uv, i.chart.triangles) for i in staying] + [x for job in whole for x in _beside(job)]
     elif staying:
         warnings.append((-1, _in_place(len(staying), len(free))))
     triangles = [_connected_triangles(island.chart) for island in free]
@@ -96,7 +98,8 @@ def lay_out(
     moved = [replace(i, uv=uv) for i, uv in zip(free, packed.islands, strict=True)]
     rounded = iter(in_single_precision(moved))
     placed = [i if stays else next(rounded) for i, stays in zip(mapped, pinned, strict=True)]
-    corners, uv = corner_uvs(len(maps), placed)
+    carried = [one.carried(*laid) for one, *laid in zip(flat, *corner_uvs(len(maps), placed), strict=True)]
+    corners, uv = [corner for corner, _ in carried], [points for _, points in carried]
     as_given = [_set_back(one, job.axes) for one, job in zip(maps, as_they_stand, strict=True)]
     return Layout(corners=corners, uv=uv, maps=as_given, packing=packed, warnings=warnings)
 
@@ -197,6 +200,26 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     return (yield from part_of(rest, share, 1 - share))
 
 
+def _without_flat(jobs: Sequence[UnwrapJob]) -> tuple[list[UnwrapJob], list[FlatTriangles]]:
+    """The jobs without triangles that would tear their maps and lie on others anyway, and these triangles of each."""
+    rest, flat = [], []
+    for job in jobs:
+        faces = np.ones(len(job.surface.face_start) - 1, dtype=bool) if job.faces is None else job.faces
+        found = flat_triangles(job.surface, faces)
+        flat.append(found)
+        left = faces.copy()
+        left[found.polygons] = False
+        rest.append(replace(job, faces=left) if len(found.polygons) else job)
+    return rest, flat
+
+
+def _lie_flat(count: int) -> str:
+    """A warning that so many triangles have no island of their own."""
+    return (
+        f"{plural(count, 'A triangle', '{} triangles')} with two corners at one place, left out of the map; {DISSOLVE}"
+    )
+
+
 def _with_charts(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
     """The job with the seams of charts of low distortion added, or as it is and a warning."""
     try:
@@ -221,7 +244,8 @@ def _joined(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
     surface, count = job.surface, len(job.surface.face_start) - 1
     if job.subdivision is not None:
         return job, ""
-    same = joined_vertices(surface, np.ones(count, dtype=bool) if job.faces is None else job.faces)
+    faces = np.ones(count, dtype=bool) if job.faces is None else job.faces
+    same = joined_vertices(surface, faces, job.was_split)
     moved = np.flatnonzero(same != np.arange(len(same)))
     if not len(moved):
         return job, ""
@@ -233,7 +257,8 @@ def _joined(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
     if markers is not None:
         markers = MapMarkers(same[markers.centre], same[markers.start], same[markers.corners])
     who = plural(len(moved), "A boundary vertex lies on another and is", "{} boundary vertices lie on others and are")
-    text = f"{who} joined to them for the map; {MERGING} joins them in the mesh, too"
+    # Of a file that had no choice there is nothing to be told.
+    text = "" if job.was_split else f"{who} joined to them for the map; {MERGING} joins them in the mesh, too"
     return replace(job, surface=with_joined_vertices(surface, same), avoid=avoid, markers=markers), text
 
 

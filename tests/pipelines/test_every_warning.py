@@ -38,6 +38,7 @@ NO_WARNINGS = {
     ("pipelines/shapes/distance.py", "{} vertices are marked"): "an error",
 }
 MERGING = "merging vertices that coincide"
+DISSOLVE = "dissolve faces without area"
 
 
 def test_every_sentence_has_a_scene_or_a_reason_why_not():
@@ -157,9 +158,19 @@ def joined(patch):
             [text] if text else [],
             [f"{who} joined to them for the map; {MERGING} joins them in the mesh, too"] * bool(who),
         )
-    patch.setattr(unwrap, "joined_vertices", lambda surface, faces: np.where(np.arange(9) == 8, 7, np.arange(9)))
+    patch.setattr(unwrap, "joined_vertices", lambda surface, faces, _: np.where(np.arange(9) == 8, 7, np.arange(9)))
     _, text = unwrap._joined(0, unwrap.UnwrapJob(triangle_surface(V, F)))
     assert text == f"{one} joined to them for the map; {MERGING} joins them in the mesh, too"
+
+
+@says("pipelines/unwrap.py", "{} with two corners at one place")
+def flat(patch):
+    V, F = meshes.grid(2, 2)
+    for rows, who in (((), ""), ((0,), "A triangle"), ((0, 5), "2 triangles")):
+        G = np.vstack([F, F[list(rows)][:, [0, 1, 1]]])
+        told = drain(unwrap.lay_out([unwrap.UnwrapJob(triangle_surface(V, G))], Settings())).warnings
+        text = f"{who} with two corners at one place, left out of the map; {DISSOLVE}"
+        yield spoken(told, 0), [text] if rows else []
 
 
 @says("pipelines/unwrap.py", "{} in place")

@@ -169,6 +169,60 @@ def test_parts_between_existing_seams_are_not_joined():
     assert len(found.maps[0].charts) == len(F)
 
 
+def test_what_a_file_had_to_split_at_borders_of_its_uvs_is_mapped_as_if_it_were_whole():
+    """Not so a slit of somebody's mesh; and there is nothing to be told of it."""
+    V, F = meshes.icosphere(2)
+    # Open along a meridian: the triangles on one side have vertices of their own there.
+    on = np.flatnonzero((np.abs(V[:, 0]) < 1e-9) & (V[:, 1] > -0.9))
+    own = np.arange(len(V))
+    own[on[np.abs(V[on, 2]) < 0.6]] = np.arange((np.abs(V[on, 2]) < 0.6).sum()) + len(V)
+    G = np.where((V[F].mean(axis=1)[:, 0] > 0)[:, None], own[F], F)
+    W = np.concatenate([V, V[own >= len(V)]])
+    assert len(W) > len(V)
+    settings = Settings(max_shear=1.35)
+    whole, split_, slit = (
+        drain(lay_out([job], settings))
+        for job in (
+            UnwrapJob(triangle_surface(V, F)),
+            UnwrapJob(triangle_surface(W, G), was_split=True),
+            UnwrapJob(triangle_surface(W, G)),
+        )
+    )
+    np.testing.assert_array_equal(split_.uv[0], whole.uv[0])
+    assert not split_.warnings and not np.array_equal(slit.uv[0], whole.uv[0])
+
+
+@pytest.mark.parametrize("at", [0, 100, 320])
+def test_triangles_without_area_that_would_tear_the_map_lie_on_their_neighbours(at):
+    """As in scans whose coordinates an exporter has rounded, once equal vertices are joined."""
+    V, F = meshes.icosphere(2)
+    a, b = F[40, :2]
+    settings = Settings(max_shear=1.35)
+    whole = drain(lay_out([UnwrapJob(triangle_surface(V, F))], settings))
+    surface = triangle_surface(V, np.insert(F, at, [[a, b, a], [b, a, b], [b, b, b]], axis=0))
+    found = drain(lay_out([UnwrapJob(surface)], settings))
+    assert len(found.maps[0].charts) == len(whole.maps[0].charts)
+    np.testing.assert_array_equal(found.corners[0], np.arange(3 * len(F) + 9))
+    flat = np.arange(3 * at, 3 * at + 9)
+    np.testing.assert_array_equal(np.delete(found.uv[0], flat, axis=0), whole.uv[0])
+    rest = np.delete(found.corners[0], flat)
+    for corner in flat:
+        there = rest[surface.corner_vertex[rest] == surface.corner_vertex[corner]]
+        assert (found.uv[0][there] == found.uv[0][corner]).all(axis=1).any()
+    for first in flat[::3]:
+        assert signed_areas(found.uv[0][[first, first + 1, first + 2]], np.arange(3)[None])[0] == 0
+    text = "3 triangles with two corners at one place, left out of the map; dissolve faces without area"
+    assert found.warnings == [(0, text)]
+
+
+def test_what_is_nothing_but_triangles_without_area_is_no_reason_to_search():
+    V, F = meshes.bumpy(6, 6)
+    line = np.array([[2.0, 0, 0], [2.1, 0, 0]])
+    strip = np.array([[0, 1, 0], [1, 1, 0], [0, 1, 1]]) + len(V)
+    found = drain(lay_out([UnwrapJob(triangle_surface(np.vstack([V, line]), np.vstack([F, strip])))], Settings()))
+    assert len(found.corners[0]) == 3 * (len(F) + 3)
+
+
 @pytest.mark.parametrize("alone", [0, 2])
 def test_a_chart_of_which_a_triangle_hangs_by_a_vertex_is_packed_with_what_fills_it(alone):
     """Whichever triangle that is, the last one, too, whose sides have none beside them."""

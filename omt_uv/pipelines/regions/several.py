@@ -171,8 +171,8 @@ def _jobs(surfaces: Sequence[Region], parts, density: np.ndarray, exponent: np.n
         start += len(a)
         pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
         target = Target(full, inside if wide > 0 else None)
-        modifier, axes = region.subdivision, region.axes
-        jobs.append(UnwrapJob(region.surface, region.faces, pins, target=target, subdivision=modifier, axes=axes))
+        job = UnwrapJob(region.surface, region.faces, pins, target=target, axes=region.axes)
+        jobs.append(replace(job, subdivision=region.subdivision, was_split=region.was_split))
     return jobs
 
 

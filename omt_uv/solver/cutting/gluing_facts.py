@@ -10,7 +10,7 @@ import numpy as np
 from ..analysis.feature_edges import fold_angles
 from ..mesh.geometry import angle_defects, angles_from_lengths, bounds, face_areas, halfedge_lengths, lengths
 from ..mesh.gluing import Gluing, components, corner_classes, groups
-from ..mesh.surface import Surface, is_seam, is_sharp
+from ..mesh.surface import DEGENERATE, Surface, is_seam, is_sharp
 from ..mesh.topology import distinct, first_places, halfedges, pair_keys
 from ..quads.recombination import quad_diagonals
 from .component import SEAM, SHARP, SMOOTH, CutComponent, SideFinder, make_component
@@ -47,7 +47,7 @@ def diagonal_pairs(gluing: Gluing, positions: np.ndarray, factor: np.ndarray) ->
 
 
 def total_curvature(gluing: Gluing, corner_class: np.ndarray, component_of: np.ndarray, positions) -> np.ndarray:
-    """Curvature (k,) of every component off its boundary, in radians, summed without sign."""
+    """Curvature (k,) of every component off its boundary, in radians, summed without sign; none of what is a line."""
     classes = corner_class[gluing.triangles]
     n = int(classes.max()) + 1
     length = halfedge_lengths(positions, gluing.vertex[gluing.triangles]).reshape(-1, 3)
@@ -57,7 +57,13 @@ def total_curvature(gluing: Gluing, corner_class: np.ndarray, component_of: np.n
     curvature = np.abs(angle_defects(classes, angles_from_lengths(length), boundary, n))
     curvature[boundary] = 0
     vertices, where = first_places(classes)
-    return np.bincount(component_of[where // 3], curvature[vertices], int(component_of.max()) + 1)
+    count = int(component_of.max()) + 1
+    area = np.bincount(component_of, face_areas(positions, gluing.vertex[gluing.triangles]), count)
+    longest = np.zeros(count)
+    np.maximum.at(longest, component_of, length.max(axis=1))
+    return np.where(
+        area > DEGENERATE * longest**2, np.bincount(component_of[where // 3], curvature[vertices], count), 0
+    )
 
 
 def marked_triangles(surface: Surface, gluing: Gluing) -> np.ndarray:

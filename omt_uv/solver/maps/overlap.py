@@ -82,7 +82,7 @@ def _pairs_in(grid: _Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> float:
     """Which share of some triangles (p,) others of them (t,3) with places (k,) complex cover, too: a small part of them
-    is missed by samples of all."""
+    is missed by samples of all. None of what has no area."""
     uv = as_points(flat)[corners]
     return _part_covered(uv, part, _Grid(uv))
 
@@ -108,7 +108,7 @@ def _part_covered(uv: np.ndarray, part: np.ndarray, grid: _Grid) -> float:
     point, over = _pairs_in(grid, np.einsum("kc,pcd->pkd", inside, uv[part]).reshape(-1, 2))
     twice = np.unique(point[over != part[point // 3]])
     area = np.abs(signed_areas(uv[part].reshape(-1, 2), np.arange(3 * len(part)).reshape(-1, 3)))
-    return float(area[twice // 3].sum() / (3 * area.sum()))
+    return float(area[twice // 3].sum() / (3 * area.sum())) if area.any() else 0.0
 
 
 def _chunks(points: np.ndarray, pairs: np.ndarray) -> list[np.ndarray]:
@@ -135,7 +135,8 @@ class _Grid:
         self.sides = np.roll(self.tri, -1, axis=1) - self.tri
         low, high = tri.min(1), tri.max(1)
         self.origin = low.min(0)
-        self.extent = (high.max(0) - self.origin).max()
+        # What lies in a point is in one cell.
+        self.extent = (high.max(0) - self.origin).max() or 1.0
         self.side = int(np.clip(np.sqrt(len(tri)), 8, 1024))
         most = min(ENTRIES_PER_FACE * len(tri), max(MOST_ENTRIES, 8 * len(tri)))
         first, span = self._boxes(low, high)

@@ -22,6 +22,7 @@ from .topology import (
     graph_components,
     halfedges,
     joined_along,
+    next_corners,
     only_once,
     opposite_sides,
     order_of_pairs,
@@ -182,6 +183,64 @@ def _healed(gluing: Gluing) -> Gluing:
     )
 
 
+@dataclass(frozen=True)
+class FlatTriangles:
+    """Triangles that lie on an edge or a vertex of other polygons: these polygons (t,), their corners (3t,), and the
+    corner (3t,) of another polygon at the same place as each."""
+
+    polygons: np.ndarray
+    corners: np.ndarray
+    hosts: np.ndarray
+
+    def carried(self, corners: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (k,), ascending, with UVs (k,2), and those of these triangles, with the UVs of their hosts."""
+        at = np.searchsorted(corners, self.hosts)
+        there = np.isin(self.hosts, corners)
+        every = np.concatenate([corners, self.corners[there]])
+        order = np.argsort(every, kind="stable")
+        return every[order], np.concatenate([uv, uv[at[there]]])[order]
+
+
+def flat_triangles(surface: Surface, faces: np.ndarray) -> FlatTriangles:
+    """Triangles of the polygons `faces` (f,) bool with two corners at one place that would tear a map: with a vertex
+    used twice, or an open side. Without them their neighbours meet. What lies on no other polygon is none of them."""
+    vertex, after, size = surface.corner_vertex, next_corners(surface.face_start), np.diff(surface.face_start)
+    tail, head = surface.positions[vertex], surface.positions[vertex[after]]
+    owner = np.repeat(np.arange(len(faces)), size)
+    short = np.flatnonzero((tail == head).all(axis=1) & (faces & (size == 3))[owner])
+    found = np.zeros(len(faces), dtype=bool)
+    found[owner[short]] = True
+    none = np.zeros(0, np.int64)
+    if not len(short):
+        return FlatTriangles(none, none, none)
+    chosen = np.flatnonzero(faces[owner])
+    open_ = chosen[only_once(pair_keys(vertex[chosen], vertex[after[chosen]]))]
+    twice = short[vertex[short] == vertex[after[short]]]
+    torn = np.zeros(len(faces), dtype=bool)
+    torn[owner[open_]] = torn[owner[twice]] = True
+    found &= torn
+    place = places(surface.positions)[vertex]
+    kept, mine = np.flatnonzero((faces & ~found)[owner]), np.flatnonzero(found[owner]).reshape(-1, 3)
+    hosts = _hosts(place, after, kept, mine)
+    mine, hosts = mine[(hosts >= 0).all(axis=1)], hosts[(hosts >= 0).all(axis=1)]
+    return FlatTriangles(owner[mine[:, 0]], mine.ravel(), hosts.ravel())
+
+
+def _hosts(place: np.ndarray, after: np.ndarray, kept: np.ndarray, mine: np.ndarray) -> np.ndarray:
+    """For every corner of triangles (t,3) one at the same place (c,) among those `kept` (k,), all of one side for all
+    three; -1 where there is none. after (c,): the next corner."""
+    sides = np.concatenate([kept, mine.ravel()])
+    key = row_labels(np.sort(np.stack([place[sides], place[after[sides]]], axis=1), axis=1))
+    of_side, of_corner = np.full((2, max(int(key.max()), int(place.max())) + 1), -1)
+    of_side[key[: len(kept)][::-1]] = kept[::-1]
+    of_corner[place[kept][::-1]] = kept[::-1]
+    side = of_side[key[len(kept) :]].reshape(-1, 3)
+    side = np.where(place[mine] == place[after[mine]], -1, side).max(axis=1)[:, None]
+    both = np.where(place[side] == place[mine], side, after[side])
+    in_point = (place[mine] == place[mine[:, :1]]).all(axis=1)[:, None]
+    return np.where(in_point, of_corner[place[mine]], np.where(side < 0, -1, both))
+
+
 def charts_without_area(charts: Sequence[Chart]) -> np.ndarray:
     """Which charts (c,) bool have a triangle without area that `with_area` would move."""
     disks = [chart.disk for chart in charts]
@@ -311,13 +370,13 @@ def _keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a.astype(np.int64) << 32) | b.astype(np.int64)
 
 
-def joined_vertices(surface: Surface, faces: np.ndarray) -> np.ndarray:
+def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False) -> np.ndarray:
     """The vertex (n,) that each one is, where sides of separate parts lie exactly on one another: the first of those
     that are joined, or itself. Importers split meshes so, at hard edges and at the borders of their UVs.
 
     faces (f,) bool : the polygons that count. Two sides are joined that run against each other where no third one lies,
-    and neither is a seam. A part that touches itself was meant to be open there, and a leaf whose polygons lie on one
-    another to have two sides.
+    and neither is a seam. A part that touches itself was meant to be open there, unless a file format has no other way
+    to say where its UVs part, was_split; and a leaf whose polygons lie on one another to have two sides.
     """
     n, owner = len(surface.positions), np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
     ends, chosen = side_ends(surface), np.flatnonzero(faces[owner])
@@ -336,7 +395,7 @@ def joined_vertices(surface: Surface, faces: np.ndarray) -> np.ndarray:
     if not first.size:
         return np.arange(n)
     part = graph_components(ends[0, chosen], ends[1, chosen], n)[1]
-    apart = part[first[0]] != part[second[0]]
+    apart = (part[first[0]] != part[second[0]]) | was_split
     label = joined_along(n, first[:, apart], second[:, apart])
     # No polygon shall have one vertex twice.
     twice = row_labels(np.stack([owner[border[owner]], label[corners]], axis=1))

@@ -219,7 +219,10 @@ def as_far_as_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResu
     boundary touches itself: what was solved for once need not be solved for again. Unmoved where that lowers no energy.
     """
     step = np.zeros(len(stage.w)) if stage.ahead is None else stage.ahead - stage.w
-    near = stage.w + problem.barrier(stage.w).limit(stage.w, step) * step
+    most = problem.barrier(stage.w).limit(stage.w, step)
+    if not np.isfinite(most):
+        return stage.w
+    near = stage.w + most * step
     lower = np.isfinite(near).all() and newton.energy(near) < stage.energy
     return near if lower and not problem.boundary_crosses(near) else stage.w
 

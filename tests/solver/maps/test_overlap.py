@@ -68,6 +68,16 @@ def test_a_map_without_area():
     assert overlap_share(np.zeros((4, 3, 2))) == 0
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_a_part_without_area_is_covered_by_nothing(size):
+    """A triangle in a point inside another one, or all in that point."""
+    flat = np.array([0, size, 1j * size, 0.2 * size * (1 + 1j)])
+    triangles = np.array([[0, 1, 2], [3, 3, 3]])
+    assert overlap.part_covered(flat, triangles, np.array([1])) == 0
+    assert overlap.covers_little(flat, triangles, np.array([1]), (0.0, 0.0), 100)
+
+
 @pytest.mark.parametrize("chunk", [1, 7, 1000])
 def test_samples_are_looked_at_in_parts_of_any_size(chunk, monkeypatch):
     rng = np.random.default_rng(0)

@@ -448,8 +448,13 @@ def test_a_part_that_touches_itself_and_a_leaf_with_two_sides_stay_open():
     end = np.isclose(V[:, 0], 1)
     rolled[end] = rolled[np.flatnonzero(np.isclose(V[:, 0], 0))]
     assert np.array_equal(joined(triangle_surface(rolled, F)), np.arange(len(V)))
+    # Of a file that had to split it at the borders of its UVs its sides are one.
+    same = repair.joined_vertices(triangle_surface(rolled, F), np.ones(len(F), bool), was_split=True)
+    assert np.array_equal(rolled[same], rolled) and len(np.unique(same)) == len(V) - end.sum()
     both = triangle_surface(np.concatenate([V, V]), np.concatenate([F, F[:, ::-1] + len(V)]))
     assert np.array_equal(joined(both), np.arange(2 * len(V)))
+    whole = np.ones(2 * len(F), bool)
+    assert np.array_equal(repair.joined_vertices(both, whole, was_split=True), np.arange(2 * len(V)))
 
 
 def test_sides_in_one_direction_or_in_threes_stay_apart():
@@ -467,3 +472,60 @@ def test_no_polygon_gets_one_vertex_twice():
     for k in range(3):
         corners = surface.corner_vertex[surface.face_start[k] : surface.face_start[k + 1]]
         assert len(np.unique(same[corners])) == len(corners)
+
+
+def flat_of(surface, faces=None):
+    return repair.flat_triangles(surface, np.ones(len(surface.face_start) - 1, bool) if faces is None else faces)
+
+
+def place_of_corners(surface, corners):
+    return surface.positions[surface.corner_vertex[corners]]
+
+
+@pytest.mark.parametrize("at", [0, 7, 18])
+@pytest.mark.parametrize("apart", [False, True], ids=["joined", "split"])
+def test_triangles_that_lie_on_an_edge_or_a_vertex_are_found_with_the_corners_they_lie_on(at, apart):
+    V, F = meshes.grid(3, 3)
+    a, b = F[4, :2]
+    G = np.insert(F, at, [[a, b, a], [b, a, a], [a, a, a]], axis=0)
+    surface = (
+        triangle_surface(V[G].reshape(-1, 3), np.arange(G.size).reshape(-1, 3)) if apart else triangle_surface(V, G)
+    )
+    found = flat_of(surface)
+    assert sorted(found.polygons) == [at, at + 1, at + 2]
+    np.testing.assert_array_equal(found.corners, (3 * np.sort(found.polygons)[:, None] + np.arange(3)).ravel())
+    np.testing.assert_array_equal(*(place_of_corners(surface, c) for c in (found.corners, found.hosts)))
+    hosts = found.hosts.reshape(-1, 3) // 3
+    assert not np.isin(hosts, found.polygons).any()
+    # All of one polygon, so that its UVs lie on an edge of that.
+    assert (hosts == hosts[:, :1]).all()
+
+
+def test_only_triangles_that_would_tear_a_map_and_lie_on_a_polygon_are_found():
+    V, F = meshes.grid(3, 3)
+    inner = V.copy()
+    # An edge inside without length: its triangles are joined all around.
+    inner[5] = inner[6]
+    assert len(flat_of(triangle_surface(inner, F)).polygons) == 0
+    a, b = F[4, :2]
+    with_one = triangle_surface(V, np.vstack([F, [[a, b, a]]]))
+    chosen = np.ones(len(F) + 1, bool)
+    assert flat_of(with_one, chosen).polygons.tolist() == [len(F)]
+    chosen[-1] = False
+    assert len(flat_of(with_one, chosen).polygons) == 0
+    # Those beside it are not chosen: it would have nothing to lie on.
+    assert len(flat_of(with_one, ~chosen).polygons) == 0
+    # A needle has no area, either, but no two corners at one place.
+    needle = np.vstack([V, V[a] + [0, 0, 1e-13]])
+    assert len(flat_of(triangle_surface(needle, np.vstack([F, [[a, b, len(V)]]]))).polygons) == 0
+    nowhere = np.vstack([V, [[np.nan] * 3]])
+    assert len(flat_of(triangle_surface(nowhere, np.vstack([F, [[len(V)] * 3]]))).polygons) == 0
+
+
+def test_uvs_are_carried_from_the_corners_that_have_some():
+    flat = repair.FlatTriangles(np.array([1]), np.array([3, 4, 5]), np.array([7, 2, 9]))
+    corners, uv = flat.carried(np.array([0, 2, 7]), np.array([[0.0, 0], [0.2, 1], [0.7, 1]]))
+    assert corners.tolist() == [0, 2, 3, 4, 7]
+    assert uv.tolist() == [[0, 0], [0.2, 1], [0.7, 1], [0.2, 1], [0.7, 1]]
+    nothing = repair.FlatTriangles(*(np.zeros(0, np.int64) for _ in range(3)))
+    np.testing.assert_array_equal(nothing.carried(corners, uv)[0], corners)
