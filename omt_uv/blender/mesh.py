@@ -18,7 +18,7 @@ from ..pipelines.reading import Reading
 from ..solver.analysis.facing import SceneAxes
 from ..solver.errors import MeshError, NonFiniteError
 from ..solver.mesh.geometry import places
-from ..solver.mesh.surface import Surface, with_joined_vertices
+from ..solver.mesh.surface import Surface, duplicate_faces, with_joined_vertices
 from ..solver.mesh.topology import first_of
 from .subdivision import modifier_of
 from .versions import uv_values
@@ -145,7 +145,8 @@ def _three(vector: np.ndarray) -> tuple[float, float, float]:
 def weld_split_vertices(reading: Reading) -> Reading:
     """Join vertices that a file format had to split: equal position and, where there are UVs, equal UV.
 
-    The mesh stays as it is; the corners of the surface all refer to the first of the equal vertices.
+    The mesh stays as it is; the corners of the surface all refer to the first of the equal vertices. Faces that would
+    be double then, as both sides of a leaf, keep their own.
     """
     surface = reading.surface
     key = surface.positions
@@ -154,6 +155,11 @@ def weld_split_vertices(reading: Reading) -> Reading:
         uv[surface.corner_vertex] = reading.uv
         key = np.concatenate([key, uv], axis=1)
     same = first_of(places(key))
+    size = np.diff(surface.face_start)
+    double = np.zeros(len(size), dtype=bool)
+    double[duplicate_faces(with_joined_vertices(surface, same), ~double)[:, 0]] = True
+    own = same[surface.corner_vertex[np.repeat(double, size)]]
+    same = np.where(np.isin(same, own), np.arange(len(same)), same)
     return replace(reading, surface=with_joined_vertices(surface, same), was_split=True)
 
 

@@ -18,6 +18,7 @@ from .geometry import cross3, edge_lengths, extents, lengths, places
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam, side_ends
 from .topology import (
+    expand,
     first_of,
     graph_components,
     halfedges,
@@ -86,14 +87,14 @@ def repaired_gluing(surface: Surface, faces: np.ndarray, triangles: np.ndarray, 
 def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """Layer (f,) of every polygon, -1 for those that cannot be joined to any, and warnings.
 
-    The first of several faces on the same vertices is in layer 0, the second in layer 1: a surface that lies double
-    falls into two, each with its own map.
+    Of several faces on the same vertices one is in layer 0, the next in layer 1: a surface that lies double falls into
+    two, each with its own map.
     """
     f = len(surface.face_start) - 1
     layer = np.zeros(f, dtype=np.int64)
     warnings = []
     rows = duplicate_faces(surface, faces)
-    layer[rows[:, 0]] = rows[:, 1]
+    layer[rows[:, 0]] = _floors(surface, faces, rows)
     copies = int((rows[:, 1] > 0).sum())
     if copies:
         warnings.append(
@@ -110,6 +111,29 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
             f"{plural(len(repeating), '1 face', '{} faces')} with a vertex used twice, mapped apart; {DISSOLVE}"
         )
     return layer, warnings
+
+
+def _floors(surface: Surface, faces: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """A number (k,) from 0 on of each of the faces `rows` (k,3) of `duplicate_faces` among its likes: faces that go on
+    in one another have the same, whichever comes first in the mesh."""
+    if not len(rows):
+        return np.zeros(0, np.int64)
+    ends, owner = side_ends(surface), np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
+    double = np.zeros(len(surface.positions), dtype=bool)
+    double[surface.corner_vertex[np.isin(owner, rows[:, 0])]] = True
+    sides = np.flatnonzero(faces[owner] & double[ends].all(axis=0))
+    twin = np.arange(len(faces))
+    twin[rows[:, 0]] = rows[:, 2]
+    one, other = opposite_sides(np.arange(len(double)), ends[:, sides], twin[owner[sides]])
+    part = graph_components(owner[sides[one]], owner[sides[other]], len(faces))[1]
+    # The larger part first: what lies on it is its other side.
+    rank = np.argsort(np.argsort(-np.bincount(part), kind="stable"))[part[rows[:, 0]]]
+    order = np.lexsort((rows[:, 0], rank, rows[:, 2]))
+    begin = np.flatnonzero(np.diff(rows[order, 2], prepend=-1))
+    count = np.diff(begin, append=len(rows))
+    floor = np.zeros(len(rows), np.int64)
+    floor[order] = expand(count)[1]
+    return floor
 
 
 def _pair_sides(surface: Surface, gluing: Gluing, layer: np.ndarray) -> tuple[Gluing, np.ndarray]:
@@ -370,13 +394,20 @@ def _keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a.astype(np.int64) << 32) | b.astype(np.int64)
 
 
+def _twins(surface: Surface, faces: np.ndarray) -> np.ndarray:
+    """A number (f,) for every polygon, the same for those of `faces` (f,) bool that have the same vertices."""
+    number, rows = np.arange(len(faces)), duplicate_faces(surface, faces)
+    number[rows[:, 0]] = rows[:, 2]
+    return number
+
+
 def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False) -> np.ndarray:
     """The vertex (n,) that each one is, where sides of separate parts lie exactly on one another: the first of those
     that are joined, or itself. Importers split meshes so, at hard edges and at the borders of their UVs.
 
-    faces (f,) bool : the polygons that count. Two sides are joined that run against each other where no third one lies,
-    and neither is a seam. A part that touches itself was meant to be open there, unless a file format has no other way
-    to say where its UVs part, was_split; and a leaf whose polygons lie on one another to have two sides.
+    faces (f,) bool : the polygons that count. Two sides are joined that run against each other, see `opposite_sides`,
+    and neither of which is a seam. A part that touches itself was meant to be open there, unless a file format has no
+    other way to say where its UVs part, was_split.
     """
     n, owner = len(surface.positions), np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
     ends, chosen = side_ends(surface), np.flatnonzero(faces[owner])
@@ -384,14 +415,14 @@ def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False
     once = only_once(key)
     side = chosen[once[~is_seam(surface, key[once])]]
     # Most meshes are whole, or open in few places.
-    border, twofold = np.zeros(len(faces), dtype=bool), np.zeros(len(faces), dtype=bool)
+    border = np.zeros(len(faces), dtype=bool)
     border[owner[side]] = True
     corners = surface.corner_vertex[border[owner]]
     place, used = np.full(n, -1), np.unique(corners)
     place[used] = places(surface.positions[used])
-    twofold[duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), border)[:, 0]] = True
-    sides = ends[:, side[~twofold[owner[side]]]]
-    first, second = (sides[:, k] for k in opposite_sides(place, sides))
+    twin = _twins(replace(surface, corner_vertex=place[surface.corner_vertex]), border)
+    sides = ends[:, side]
+    first, second = (sides[:, k] for k in opposite_sides(place, sides, twin[owner[side]]))
     if not first.size:
         return np.arange(n)
     part = graph_components(ends[0, chosen], ends[1, chosen], n)[1]

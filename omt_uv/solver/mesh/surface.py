@@ -134,9 +134,10 @@ def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> 
 
 
 def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
-    """Polygons on the same set of vertices as another: rows (k,2) of polygon and its number among its likes."""
+    """Polygons on the same set of vertices as another: rows (k,3) of polygon, its number among its likes, and the first
+    of these."""
     size = np.diff(surface.face_start)
-    rows = [np.zeros((0, 2), np.int64)]
+    rows = [np.zeros((0, 3), np.int64)]
     for s in np.unique(size[faces]):
         index = np.flatnonzero(faces & (size == s))
         vertices = np.sort(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)], axis=1)
@@ -146,7 +147,8 @@ def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
         number = np.zeros(len(index), np.int64)
         number[order] = np.arange(len(index)) - (np.cumsum(count) - count)[inverse[order]]
         twice = count[inverse] > 1
-        rows.append(np.stack([index[twice], number[twice]], axis=1))
+        first = index[order[np.cumsum(count) - count]][inverse]
+        rows.append(np.stack([index[twice], number[twice], first[twice]], axis=1))
     return np.concatenate(rows)
 
 

@@ -16,6 +16,8 @@ FEW_NODES = 2000
 FEW_PAIRS = 8000
 # So many times as many as there are integers the largest may be where they are counted.
 COUNTED = 4
+# Of more sides between two places none meet: four are those of two polygons that both have two sides.
+MOST_SIDES = 4
 
 
 def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -164,13 +166,32 @@ def only_once(keys: np.ndarray) -> np.ndarray:
     return np.sort(first[count == 1])
 
 
-def opposite_sides(place: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def opposite_sides(
+    place: np.ndarray, ends: np.ndarray, twin: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Positions (p,) and (p,) of pairs of sides (2,s) between vertices that lie at the same places (n,), the other way
-    round, and where no third side lies."""
+    round, where neither has a third one to choose.
+
+    twin (s,) : the same for polygons that lie on one another: both sides of a leaf do not meet, but each goes on where
+    its neighbour has two sides as well; none do by default
+    """
     tail, head = place[ends]
-    first, second = pair_up(pair_keys(tail, head))
+    key = pair_keys(tail, head)
+    order = order_of_pairs(key)
+    begin = np.flatnonzero(np.diff(key[order], prepend=-1))
+    count = np.diff(begin, append=len(key))
+    pairs = []
+    for step in range(1, MOST_SIDES):
+        several = np.flatnonzero((count > step) & (count <= MOST_SIDES))
+        row, k = expand(count[several] - step)
+        pairs.append(np.stack([begin[several][row] + k, begin[several][row] + k + step]))
+    first, second = order[np.concatenate(pairs, axis=1)]
     against = (tail[first] == head[second]) & (tail[first] != head[first])
-    return first[against], second[against]
+    against &= True if twin is None else twin[first] != twin[second]
+    first, second = first[against], second[against]
+    once = np.bincount(np.concatenate([first, second]), minlength=len(key)) == 1
+    alone = once[first] & once[second]
+    return first[alone], second[alone]
 
 
 def joined_along(n: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:

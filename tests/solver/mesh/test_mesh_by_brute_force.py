@@ -46,6 +46,21 @@ def test_opposite_sides_run_against_each_other_and_are_two(seed):
     assert found == expected
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_sides_of_polygons_that_lie_on_one_another_choose_among_the_others(seed):
+    rng = random(seed)
+    ends, twin = rng.integers(0, 5, (2, 24)), rng.integers(0, 12, 24)
+    tail, head = ends
+    alike = [[j for j in range(24) if {tail[j], head[j]} == {tail[i], head[i]}] for i in range(24)]
+    to = [
+        [j for j in alike[i] if tail[j] == head[i] != tail[i] and twin[i] != twin[j]] if len(alike[i]) <= 4 else []
+        for i in range(24)
+    ]
+    expected = {(i, to[i][0]) for i in range(24) if len(to[i]) == 1 and len(to[to[i][0]]) == 1 and i < to[i][0]}
+    found = set(zip(*(x.tolist() for x in topology.opposite_sides(np.arange(5), ends, twin)), strict=True))
+    assert found == expected and (seed or expected)
+
+
 def test_a_pair_of_sides_of_no_length_is_no_pair():
     place = np.array([0, 0, 0, 1])
     first, second = topology.opposite_sides(place, np.array([[0, 1, 0, 3], [1, 2, 3, 2]]))

@@ -529,3 +529,39 @@ def test_uvs_are_carried_from_the_corners_that_have_some():
     assert uv.tolist() == [[0, 0], [0.2, 1], [0.7, 1], [0.2, 1], [0.7, 1]]
     nothing = repair.FlatTriangles(*(np.zeros(0, np.int64) for _ in range(3)))
     np.testing.assert_array_equal(nothing.carried(corners, uv)[0], corners)
+
+
+@pytest.mark.parametrize("first", ["outer", "inner", "mixed"])
+@pytest.mark.parametrize("split_up", [False, True], ids=["shared", "split"])
+def test_a_surface_with_two_sides_is_two_surfaces_whatever_the_order_of_its_faces(first, split_up):
+    """Each of them whole, and with all its faces the right way round."""
+    V, F = meshes.icosphere(1)
+    rng = np.random.default_rng(3)
+    swap = {"outer": np.zeros(len(F), bool), "inner": np.ones(len(F), bool), "mixed": rng.random(len(F)) < 0.5}[first]
+    both = np.concatenate([np.where(swap[:, None], F[:, ::-1], F), np.where(swap[:, None], F, F[:, ::-1])])
+    both = both[rng.permutation(len(both))]
+    surface = triangle_surface(V, both)
+    if split_up:
+        surface = triangle_surface(V[both].reshape(-1, 3), np.arange(both.size).reshape(-1, 3))
+        same = repair.joined_vertices(surface, np.ones(len(both), bool))
+        assert len(np.unique(same)) == 2 * len(V)
+        surface = triangle_surface(surface.positions, same.reshape(-1, 3))
+    found = cut_to_disks(surface)
+    assert len(found.charts) == 2 and not any("look" in text for text in found.warnings)
+    outwards = (
+        np.einsum(
+            "mc,mc->m", np.cross(V[both[:, 1]] - V[both[:, 0]], V[both[:, 2]] - V[both[:, 0]]), V[both].mean(axis=1)
+        )
+        > 0
+    )
+    sides = [set(outwards[chart.faces].tolist()) for chart in found.charts]
+    assert sides in ([{True}, {False}], [{False}, {True}])
+
+
+def test_one_side_of_a_leaf_goes_on_in_what_has_one_side_alone():
+    V, F = meshes.grid(4, 4)
+    some = V[F].mean(axis=1)[:, 0] < 0.5
+    both = np.concatenate([F[some][:, ::-1], F])
+    found = cut_to_disks(triangle_surface(V, both))
+    sizes = sorted(len(chart.triangles) for chart in found.charts)
+    assert sizes == [int(some.sum()), len(F)]

@@ -34,7 +34,9 @@ def test_duplicates_are_numbered_among_their_likes():
     V, F = meshes.grid(2, 2)
     twice = np.concatenate([F, F[[3, 5, 3]][:, [1, 2, 0]]])
     rows = duplicate_faces(triangle_surface(V, twice), np.ones(len(twice), bool))
-    assert rows.tolist() == [[3, 0], [5, 0], [8, 1], [9, 1], [10, 2]]
+    assert rows[:, :2].tolist() == [[3, 0], [5, 0], [8, 1], [9, 1], [10, 2]]
+    assert (np.sort(twice[rows[:, 0]], axis=1) == np.sort(twice[rows[:, 2]], axis=1)).all()
+    assert set(rows[:, 2]) == {3, 5}
 
 
 def test_seams_know_no_direction():
