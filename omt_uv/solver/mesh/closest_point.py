@@ -171,8 +171,7 @@ class ClosestPoint:
         levels = [(owner, self._plain, pitch)]
         while len(owner) > FEW_SAMPLES:
             pitch *= 2
-            cubes = np.floor((samples - samples.min(axis=0)) / pitch).astype(np.int64)
-            first = np.unique(cubes, axis=0, return_index=True)[1]
+            first = _one_of_each(np.floor((samples - samples.min(axis=0)) / pitch).astype(np.int64))
             owner, samples = owner[first], samples[first]
             levels.append((owner, cKDTree(samples), pitch))
         return levels
@@ -349,11 +348,24 @@ def points_in(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
 
     As an einsum has them to the bit, in a quarter of the time.
     """
-    points = np.empty((corners.shape[1], len(places), 3))
     a, b, c = corners
+    if len(places) > len(a):
+        # Of a few large triangles: place by place takes seconds.
+        x, y, z = places.T[:, :, None]
+        return (x * a[:, None] + y * b[:, None] + z * c[:, None]).reshape(-1, 3)
+    points = np.empty((len(a), len(places), 3))
     for k, (x, y, z) in enumerate(places):
         points[:, k] = x * a + y * b + z * c
     return points.reshape(-1, 3)
+
+
+def _one_of_each(cubes: np.ndarray) -> np.ndarray:
+    """The first of the rows (s,3), whole numbers from 0 on, that are alike, in lexicographic order of what they are."""
+    x, y, z = (int(n) + 1 for n in cubes.max(axis=0))
+    if x * y * z > np.iinfo(np.int64).max:
+        return np.unique(cubes, axis=0, return_index=True)[1]
+    # One number for a row is in the same order, and sorted in a tenth of the time.
+    return np.unique((cubes[:, 0] * y + cubes[:, 1]) * z + cubes[:, 2], return_index=True)[1]
 
 
 def random_points(mass: np.ndarray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
