@@ -61,6 +61,17 @@ def pytest_configure(config):
     told.Progress.__init__, told.part_of = within, part_within
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected stays to the end: nobody looks for garbage among its million objects, now or in a test."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def pytest_collection_modifyitems(items):
     """What takes longest in one file comes first, so that processes that run side by side end together."""
     items.sort(key=lambda item: item.path.name not in LONG)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import functools
 import importlib
 import inspect
 import re
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sources import tree_of
 
 from omt_uv.solver import errors
 from omt_uv.solver.errors import MeshError
@@ -68,11 +68,6 @@ UNEVEN = {
 ARRAYS = "V|F|vertices|edges|faces|triangles|halfedges|corners|positions|polygons"
 LOOP = re.compile(rf"(range\(len\()?(enumerate\()?(\w+\.)*({ARRAYS})(\.tolist\(\))?\)*")
 SHAPE = re.compile(r"\((\d|[a-z]{1,2}|\.\.\.),[^)]*\)")
-
-
-@functools.cache
-def tree_of(path):
-    return ast.parse(path.read_text())
 
 
 def nodes(paths, kind):
@@ -245,7 +240,7 @@ def test_tests_assert_nothing_about_time():
 def test_every_module_of_the_solver_is_imported_by_a_test():
     imported = set()
     for path in TESTS:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ImportFrom) and node.module:
                 imported |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
     every = {

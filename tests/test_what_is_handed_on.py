@@ -11,6 +11,8 @@ import functools
 from collections.abc import Iterator
 from pathlib import Path
 
+from sources import tree_of
+
 ROOT = Path(__file__).resolve().parents[1] / "omt_uv"
 # What is left out, by the function and the class that it makes: why it is left out.
 LEFT_OUT = {
@@ -34,7 +36,7 @@ LEFT_OUT = {
 @functools.cache
 def trees() -> list[ast.Module]:
     """The sources; not before a test asks for them."""
-    return [ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))]
+    return [tree_of(path) for path in sorted(ROOT.rglob("*.py"))]
 
 
 def _is_dataclass(node: ast.AST) -> bool:

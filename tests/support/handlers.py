@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from kept import ROOT, modules
+from sources import tree_of
 
 # Names of builtins that do the same with a `Name` as with what it stands for.
 SAME = {"str", "repr", "tuple", "list", "dict", "getattr", "True", "False", "None", "zip"}
@@ -39,7 +40,7 @@ def handlers() -> tuple[Handler, ...]:
 
 def _found() -> Iterator[Handler]:
     for module in modules():
-        tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8"))
+        tree = tree_of(ROOT / f"{module.replace('.', '/')}.py")
         counts: dict[str, int] = {}
         for function, around in _tries(tree, ""):
             for node in around.handlers:

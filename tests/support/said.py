@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
+
+from sources import tree_of
 
 import omt_uv
 
@@ -37,10 +40,13 @@ def sentences(*folders: str) -> list[Sentence]:
     """All sentences of the modules in some folders, or files, of the package, but those of errors and help."""
     paths = [p for f in folders for p in ([ROOT / f] if f.endswith(".py") else sorted((ROOT / f).rglob("*.py")))]
     paths = [p for p in paths if p.name not in LISTS]
-    found = [
-        Sentence(str(path.relative_to(ROOT)), text) for path in paths for text in _texts(ast.parse(path.read_text()))
-    ]
+    found = [Sentence(str(path.relative_to(ROOT)), text) for path in paths for text in _texts_of(path)]
     return list(dict.fromkeys(found))
+
+
+@functools.cache
+def _texts_of(path: Path) -> tuple[str, ...]:
+    return tuple(_texts(tree_of(path)))
 
 
 def _texts(tree: ast.Module) -> Iterator[str]:
