@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 from kept import ROOT, check, modules
+from sources import tree_of
 
 TABLE = Path(__file__).with_name("texts.tsv")
 # From so many values on one can stand in the place of another.
@@ -38,7 +39,7 @@ def said(node):
 def rows():
     """A line of each text, by module and function."""
     for module in modules():
-        tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text())
+        tree = tree_of(ROOT / f"{module.replace('.', '/')}.py")
         owner = {}
         for node in ast.walk(tree):
             if isinstance(node, (ast.FunctionDef, ast.ClassDef)):

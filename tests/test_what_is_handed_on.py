@@ -74,9 +74,14 @@ def given(call: ast.Call, within: ast.FunctionDef) -> dict[str, ast.expr]:
     return found | {one.arg: one.value for one in call.keywords if one.arg}
 
 
-def left_out() -> Iterator[tuple[str, str, set[str]]]:
+@functools.cache
+def left_out() -> list[tuple[str, str, set[str]]]:
     """Function, class that it makes, and the fields that this has in common with a parameter and does not get, though
     others come from there."""
+    return list(_left_out())
+
+
+def _left_out() -> Iterator[tuple[str, str, set[str]]]:
     for tree in trees():
         for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
             every = [*function.args.args, *function.args.kwonlyargs]

@@ -54,8 +54,13 @@ def files() -> list[Path]:
     return sorted(p for p in paths if p.suffix in ENDINGS and str(p.relative_to(ROOT)) not in EXCEPTED and p.is_file())
 
 
-def lines_of(path: Path):
+@functools.cache
+def lines_of(path: Path) -> list[tuple[int, str]]:
     """Pairs of line number and text: the file's name; of Python names, comments and strings, of others all."""
+    return list(_lines_of(path))
+
+
+def _lines_of(path: Path):
     yield 0, path.stem
     if path.suffix != ".py":
         yield from enumerate(path.read_text().splitlines(), 1)

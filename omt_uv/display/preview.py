@@ -64,10 +64,13 @@ class _Drawn:
 def preview(objects: Sequence[Placed], tile: int = TILE) -> np.ndarray:
     """A picture (h,w,3) in [0,1], top row first: checker or cells, layout, wireframe; without UVs clay, no layout."""
     drawn = _drawn(objects)
-    tiles = [_checkered(drawn, tile)]
+    corners, depth, light = _seen(drawn, tile)
+    found = cover(corners, depth, (tile * SAMPLES,) * 2)
+    shade = _shade(found, light)
+    tiles = [_checkered(drawn, tile, found, shade)]
     if drawn.uv is not None:
         tiles.append(_layout(drawn, tile))
-    return np.concatenate([*tiles, _wireframe(drawn, tile)], axis=1)
+    return np.concatenate([*tiles, _wireframe(drawn, tile, found, shade, corners)], axis=1)
 
 
 def _drawn(objects: Sequence[Placed]) -> _Drawn:
@@ -114,16 +117,15 @@ def _of_object(item: Placed) -> _Drawn:
     return _Drawn(space, normals[triangles], uv, real, np.zeros(len(corners)), cells)
 
 
-def _checkered(drawn: _Drawn, tile: int) -> np.ndarray:
-    """The mesh in the colours of its cells, without any with a checker on it, in clay without UVs."""
-    corners, depth, light = _seen(drawn, tile)
-    found = cover(corners, depth, (tile * SAMPLES,) * 2)
+def _checkered(drawn: _Drawn, tile: int, found: Covered, shade: np.ndarray) -> np.ndarray:
+    """The mesh, as found in pixels and in their shade (k,1), in the colours of its cells, without any with a checker on
+    it, in clay without UVs."""
     colour = np.broadcast_to(CLAY, (len(found.pixels), 3))
     if (drawn.cells >= 0).any():
         colour = np.where((drawn.cells >= 0)[:, None], cell_colours(drawn.cells), CLAY)[found.triangles]
     elif drawn.uv is not None:
         colour = checker_colours((found.weights[:, :, None] * drawn.uv[found.triangles]).sum(1))
-    return _picture(found, colour * _shade(found, light), tile)
+    return _picture(found, colour * shade, tile)
 
 
 def _layout(drawn: _Drawn, tile: int) -> np.ndarray:
@@ -139,11 +141,9 @@ def _layout(drawn: _Drawn, tile: int) -> np.ndarray:
     return _picture(found, _lined(found, corners, drawn.real, colour, 0.4), tile)
 
 
-def _wireframe(drawn: _Drawn, tile: int) -> np.ndarray:
-    """The mesh in clay with the edges of its polygons."""
-    corners, depth, light = _seen(drawn, tile)
-    found = cover(corners, depth, (tile * SAMPLES,) * 2)
-    return _picture(found, _lined(found, corners, drawn.real, CLAY * _shade(found, light)), tile)
+def _wireframe(drawn: _Drawn, tile: int, found: Covered, shade: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """The mesh in clay, as found in pixels and in their shade (k,1), with the edges of its polygons."""
+    return _picture(found, _lined(found, corners, drawn.real, CLAY * shade), tile)
 
 
 def _seen(drawn: _Drawn, tile: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

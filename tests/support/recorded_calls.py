@@ -180,8 +180,10 @@ def _fewer(leaf: np.ndarray) -> np.ndarray:
     many = 1 + flat.size // SAMPLED
     if many == 1:
         return flat
+    # To look for what is no number takes a fifth of the time of putting others there.
+    finite = flat if np.isfinite(flat).all() else np.nan_to_num(flat)
     with np.errstate(over="ignore"):
-        return np.add.reduceat(np.nan_to_num(flat), np.arange(0, flat.size, many))
+        return np.add.reduceat(finite, np.arange(0, flat.size, many))
 
 
 def _kind(leaf: np.ndarray) -> float:
