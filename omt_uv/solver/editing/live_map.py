@@ -61,6 +61,7 @@ class LiveMap:
         self._mesh = mesh = renumbered(vertices, triangles, uv, pins, polygons)
         self._given = given = mesh.uv @ [1, 1j]
         self._faces = faces = island_elements(mesh, polygons, target)
+        self._area = float(abs(faces.areas(given).sum()))
         boundary = boundary_edges(mesh.triangles)
         start, self.warnings = island_start(mesh.vertices, mesh.triangles, given, boundary, mesh.pins is not None)
         guard = None if meets_itself(start, boundary) else boundary
@@ -99,7 +100,9 @@ class LiveMap:
     def uv(self) -> np.ndarray:
         """The map (n,2) as it is; without pins it lies as the given one did."""
         pinned = self._pins is not None
-        return self._mesh.original(self._w if pinned else placed_like(self._w, self._given, self._faces))
+        return self._mesh.original(
+            self._w if pinned else placed_like(self._w, self._given, self._faces, area=self._area)
+        )
 
     def _pull(self, pins: Pins, places: np.ndarray) -> None:
         # `renumbered` sorts pins by vertex, which `_pins` keeps.

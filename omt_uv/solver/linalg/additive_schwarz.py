@@ -187,7 +187,7 @@ class AdditiveSchwarz:
     def _coarse(self, matrix: sp.csr_matrix, spread: sp.csr_matrix) -> sp.csc_matrix:
         """The equations (6 parts, 6 parts) of the motions spread (2n, 6 parts): some parts after the others, since what
         the matrix makes of all motions takes more memory than all else."""
-        gather, columns, moved = spread.T, [], np.diff(spread.indptr)
+        gather, columns, moved = spread.T.tocsr(), [], np.diff(spread.indptr)
         turns = min(1 if self._keep else IN_TURN, self._count)
         for some in np.array_split(np.arange(self._count), turns):
             here = np.repeat(np.isin(self._part, some), 2)
@@ -238,7 +238,15 @@ def affine_motions(part: np.ndarray, count: int, w: np.ndarray, axes: np.ndarray
     for begin in range(0, len(part), AT_ONCE):
         some, here = slice(begin, begin + AT_ONCE), slice(2 * begin, 2 * (begin + AT_ONCE))
         of, moved, place = np.repeat(part[some], 2), np.repeat(z[some], 2), start[:-1][here].copy()
-        for k, side in enumerate((along[here].real, along[here].imag)):
+        sides = along[here].real, along[here].imag
+        across = sides[1] != 0
+        if ((sides[0] != 0) != across).all():
+            # Each is along one axis, as nearly always: three entries follow three.
+            stretch, side = slice(place[0], place[0] + 3 * len(of)), np.where(across, sides[1], sides[0])
+            entries[stretch] = np.column_stack([side, side * moved.real, side * moved.imag]).ravel()
+            columns[stretch] = ((6 * of + 3 * across)[:, None] + np.arange(3)).ravel()
+            continue
+        for k, side in enumerate(sides):
             on = side != 0
             for m, motion in enumerate((1.0, moved.real[on], moved.imag[on])):
                 entries[place[on] + m], columns[place[on] + m] = side[on] * motion, 6 * of[on] + 3 * k + m

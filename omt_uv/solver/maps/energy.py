@@ -29,6 +29,8 @@ SHARE_ERROR = 2.7
 FACE_ERROR = 0.45
 # Triangles whose derivatives are found at a time: what is found on the way takes ten times their memory.
 AT_ONCE = 100_000
+# Triangles up to which the derivatives of the last map are kept: they take 32 bytes each, a tenth of the Hessian's.
+KEPT = 200_000
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ class Elements:
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dw/dz and dw/dconj(z) per triangle, (m,) complex each and not to be written to, of a map w (n,) complex."""
-        few = len(w) <= len(self.triangles) <= AT_ONCE  # else a copy of the map takes as long as what it would save
+        few = len(w) <= len(self.triangles) <= KEPT  # else a copy of the map takes as long as what it would save
         return self._last.of(self._derivatives, w, self.triangles, self.hats) if few else self._derivatives(w)
 
     def _derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,8 +127,10 @@ class Elements:
 
     def some_derivatives(self, w: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """`derivatives` of some triangles after the others, and which these are."""
-        few = len(self.triangles) <= AT_ONCE
-        return ((here, *(self.derivatives(w) if few else self.derivatives_at(w, here))) for here in self.some_at_once())
+        if len(self.triangles) > KEPT:
+            return ((here, *self.derivatives_at(w, here)) for here in self.some_at_once())
+        a, b = self.derivatives(w)
+        return ((here, a[here], b[here]) for here in self.some_at_once())
 
     def determinants(self, w: np.ndarray) -> np.ndarray:
         """Of the Jacobian of every triangle, (m,), of a map w (n,) complex."""
