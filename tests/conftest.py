@@ -19,8 +19,7 @@ ADDON = "bl_ext.user_default.omt_uv"
 FOLDERS = ("blender", "commands", "display", "extension", "operators", "panels", "session")
 # Files of a minute and more.
 LONG = {"test_what_every_function_tells.py", "test_what_is_told_on_wider_runs.py", "test_what_is_told_on_rare_runs.py",
-        "test_what_is_found_on_wider_inputs.py", "test_every_warning_arrives.py", "test_fuzz.py",
-        "test_writes.py"}  # fmt: skip
+        "test_what_is_found_on_wider_inputs.py", "test_every_warning_arrives.py", "test_fuzz.py"}  # fmt: skip
 STATUS = pytest.StashKey[int]()
 # Where Linux lists what a process holds open.
 TOLD_OPEN = Path("/proc/self/fd")
