@@ -63,6 +63,9 @@ def test_some_polygons_after_the_others_are_to_the_bit_what_all_at_once_are(scen
     for module in (energy_module, elements_module):
         monkeypatch.setattr(module, "AT_ONCE", 7)
     assert found() == whole
+    # Nor where what was found of the last map is not kept.
+    monkeypatch.setattr(energy_module, "KEPT", 7)
+    assert found() == whole
     # A step short of the first fold folds nothing, one beyond it does.
     far = whole[0][2]
     assert [has_folds(faces, w + share * far * step) for share in (0.999, 1.001)] == [False, True]

@@ -9,6 +9,7 @@ import pytest
 from omt_uv.solver.mesh.closest_point import (
     ClosestPoint,
     ClosestPointTracker,
+    _one_of_each,
     closest_on_triangles,
     points_in,
     spread_points,
@@ -142,3 +143,16 @@ def test_middles_of_even_triangles_tell_where_these_are():
     found = np.linalg.norm(even(points, points, 2).points - points, axis=1)
     assert (found <= exact + 1e-9).mean() > 0.99 and (found >= exact - 1e-9).all()
     assert len(even._spread[0]) < len(index._spread[0])
+
+
+def test_points_of_few_large_triangles_are_those_of_many_to_the_bit():
+    corners, places = np.random.default_rng(3).normal(size=(3, 4, 3)), subdivision_centroids(5)
+    one_by_one = [points_in(corners, places[k : k + 1]) for k in range(len(places))]
+    assert np.array_equal(points_in(corners, places).reshape(4, -1, 3), np.stack(one_by_one, axis=1))
+
+
+@pytest.mark.parametrize("wide", [7, 2**40])
+def test_one_of_each_cube_is_the_first_there(wide):
+    """However far apart they are: a number for each that would be too large is not made."""
+    cubes = np.random.default_rng(5).integers(0, 4, (200, 3)) * wide
+    assert np.array_equal(_one_of_each(cubes), np.unique(cubes, axis=0, return_index=True)[1])
