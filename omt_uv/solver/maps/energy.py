@@ -27,10 +27,8 @@ from ..mesh.geometry import LastAnswer, Sides, Sizes, kept_hats
 SHARE_ERROR = 2.7
 # and so much that of single faces of the region, or of the rest: they may be off by 1.8 %.
 FACE_ERROR = 0.45
-# Triangles whose derivatives are found at a time: what is found on the way takes ten times their memory.
-AT_ONCE = 100_000
-# Triangles up to which the derivatives of the last map are kept: they take 32 bytes each, a tenth of the Hessian's.
-KEPT = 200_000
+AT_ONCE = 100_000  # triangles whose derivatives are found at a time: on the way they take ten times their memory
+KEPT = 200_000  # triangles up to which derivatives of the last map are kept: they take a tenth of a Hessian's memory
 
 
 @dataclass(frozen=True)
@@ -127,10 +125,8 @@ class Elements:
 
     def some_derivatives(self, w: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """`derivatives` of some triangles after the others, and which these are."""
-        if len(self.triangles) > KEPT:
-            return ((here, *self.derivatives_at(w, here)) for here in self.some_at_once())
-        a, b = self.derivatives(w)
-        return ((here, a[here], b[here]) for here in self.some_at_once())
+        kept = self.derivatives(w) if len(self.triangles) <= KEPT else ()
+        return ((here, *([x[here] for x in kept] or self.derivatives_at(w, here))) for here in self.some_at_once())
 
     def determinants(self, w: np.ndarray) -> np.ndarray:
         """Of the Jacobian of every triangle, (m,), of a map w (n,) complex."""

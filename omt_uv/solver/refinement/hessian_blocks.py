@@ -307,8 +307,9 @@ def _blocks_at_once(
     n, first, (frame, free, _) = len(w), lone_triangles(faces), axes
     eagerness = EAGERNESS * (1 - pressure)
     a, b = faces.derivatives(w)
-    slopes, blocks = _slopes_and_blocks(faces, a, b, weight, pressure)
-    _add_at_vertices(gradient, faces, slopes)
+    slopes, kept, radial = by_squares(faces, a, b, weight, pressure, eagerness)
+    _add_at_vertices(gradient, faces, corner_slopes(faces, a, b, slopes))
+    blocks = triangle_blocks(faces.gradient, a, b, kept, radial)
     vertex = _in_axes(blocks, faces.triangles, axes, symmetry)
     scale = float(np.einsum("iim->", blocks)) / (2 * n)
     if faces.polygon is None:
@@ -327,21 +328,6 @@ def _blocks_at_once(
         rest=long_forms(faces, vertex, area[:first], n),
         scale=scale,
     )
-
-
-def _slopes_and_blocks(faces: Elements, a, b, weight, pressure) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient (m,3) complex by the corners, and `triangle_blocks` (6,6,m), from derivatives a, b (m,) complex: of some
-    triangles after the others, where each is a polygon, so that all that is found on the way stays in the cache."""
-    if faces.polygon is not None or len(a) <= CHUNK:
-        slopes, kept, radial = by_squares(faces, a, b, weight, pressure, EAGERNESS * (1 - pressure))
-        return corner_slopes(faces, a, b, slopes), triangle_blocks(faces.gradient, a, b, kept, radial)
-    corner, blocks = np.empty((len(a), 3), complex), np.empty((6, 6, len(a)))
-    for some, here, _, _ in in_turn(faces, CHUNK):
-        of, held = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
-        slopes, kept, radial = by_squares(some, a[here], b[here], of, held, EAGERNESS * (1 - held))
-        corner[here] = corner_slopes(some, a[here], b[here], slopes)
-        _fill_blocks(blocks[:, :, here], some.gradient, a[here], b[here], kept, radial)
-    return corner, blocks
 
 
 def _add_at_vertices(total: np.ndarray, faces: Elements, corner: np.ndarray) -> None:

@@ -77,20 +77,6 @@ def test_large_meshes_have_the_same_matrix_in_less_memory(polygons, monkeypatch)
         np.testing.assert_allclose(parts, whole, rtol=1e-12, atol=1e-12 * np.abs(whole).max())
 
 
-@pytest.mark.parametrize("several", [False, True])
-def test_blocks_of_some_triangles_after_the_others_are_those_of_all(several, monkeypatch):
-    V, T, _ = patch(7)
-    w, n = V[:, :2] @ [1, 1j] * (1 + 0.05 * V[:, 0]), len(V)
-    faces = polygon_elements(V, T, face_areas(V, T))
-    axes = np.ones(n, complex), np.ones((n, 2))
-    weight, pressure = (np.linspace(1, 20, len(T)), np.linspace(0, 1, len(T))) if several else (3.0, 0.25)
-    whole = hessian_blocks(faces, w, weight, pressure, axes)
-    monkeypatch.setattr(hessian_blocks_module, "CHUNK", 5)
-    parts = hessian_blocks(faces, w, weight, pressure, axes)
-    for one, other in ((whole.gradient, parts.gradient), (whole.triangles, parts.triangles)):
-        np.testing.assert_allclose(other, one, rtol=1e-13, atol=1e-14 * np.abs(one).max())
-
-
 def test_blocks_of_quads_keep_no_others():
     """What comes back refers to no memory but its own: blocks of all triangles of quads take twice as much."""
     V, T, owner = patch(7)
