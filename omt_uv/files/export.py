@@ -61,8 +61,9 @@ def _write_obj(path: Path, objects: Objects, everything: bool) -> list[str]:
     objects = exported_meshes(objects, everything)
     _select_only(objects)
     materials = any(obj.data.materials for obj in objects)
-    # The exporter sorts faces by material, and only where it writes materials.
-    ordered = all(_materials_ascend(obj.data) for obj in objects)
+    # The exporter sorts faces by material, and only where it writes materials; an object without any would be read with
+    # the last one of the object before.
+    ordered = all(_materials_ascend(obj.data) and (obj.data.materials or not materials) for obj in objects)
     for with_materials in [materials] if ordered or not materials else [True, False]:
         bpy.ops.wm.obj_export(
             filepath=str(path),

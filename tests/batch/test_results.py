@@ -239,3 +239,18 @@ def test_no_name_of_a_file_ends_the_data(page):
     text = page.read_text(encoding="utf-8")
     assert text.count("</script>") == 2 and "onerror=alert(1)>" not in text
     assert os.path.getsize(page) < 450 * 2000
+
+
+def test_a_table_has_every_value_as_it_is_also_none_at_all(package):
+    """No value and a value of nothing are two things."""
+    tables = package("batch.tables")
+    values = [0, 0.0, False, "0", "", None, 3, 2.5, "text"]
+    rows = [row(f"{k}.obj", tries=value, report=json.dumps({"of mine": value})) for k, value in enumerate(values)]
+    columns, flat = tables.table_of(rows)
+    read = list(csv.DictReader(io.StringIO(tables.csv_text(rows))))
+    assert len(read) == len(values) and list(read[0]) == columns
+    for line, found, value in zip(read, flat, values, strict=True):
+        assert line == {name: "" if found.get(name) is None else str(found[name]) for name in columns}
+        assert line["tries"] == ("" if value is None else str(value))
+        assert line["of mine"] == (str(value) if isinstance(value, int | float) and value is not False else
+                                   "0" if value is False else "")  # fmt: skip
