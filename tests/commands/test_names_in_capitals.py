@@ -7,6 +7,7 @@ import bpy
 
 import pytest
 import scenes
+from sphere_shapes import blob
 
 FORMATS = (".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".blend")
 
@@ -43,3 +44,32 @@ def test_capitals_at_the_end_of_a_name_are_all_one(package, run, tmp_path, monke
     assert found[0] == found[1]
     # What is lost of an .fbx is told of what is written by Blender's exporter into another one.
     assert ("Some kinds are lost" in found[0][2]) == (suffix == ".fbx" and command == "unwrap")
+
+
+# Commands, and the files that they write besides, which are each of one kind.
+OTHERS = {
+    "signature": (["--points", "60"], {"-o": ".npz"}),
+    "library": (["--points", "60"], {"-o": ".npz"}),
+    "diagram": (["--size", "32"], {"-o": ".png"}),
+    "measure": ([], {"--preview": ".png", "--attributes": ".blend"}),
+}
+
+
+@pytest.mark.parametrize("command", OTHERS)
+def test_capitals_at_the_end_of_what_is_written_besides_are_all_one(package, run, tmp_path, command):
+    words, written = OTHERS[command]
+    (tmp_path / "shapes").mkdir()
+    V, F = blob(1, seed=1)
+    obj = scenes.add(V, F)
+    scenes.set_uv(obj, 0.4 * scenes.seen_from_above(obj))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shapes" / "in.blend"))
+    begin = tmp_path / "shapes" if command == "library" else tmp_path / "shapes" / "in.blend"
+    found = []
+    for change in (str.lower, str.upper):
+        files = {option: tmp_path / f"{option.strip('-')}{change(suffix)}" for option, suffix in written.items()}
+        status, printed, told = run(command, begin, *words, *(word for pair in files.items() for word in pair))
+        for path in files.values():
+            assert path.is_file(), told
+            printed = printed.replace(str(path), path.stem)
+        found.append((status, printed, told))
+    assert found[0] == found[1] and found[0][0] == 0

@@ -74,6 +74,26 @@ def test_only_meshes_are_told_of_in_a_report(package):
     assert lines == [f"mesh 1: {told}", f"mesh 2: {told}"]
 
 
+@pytest.mark.parametrize(
+    "names", [("A",), ("A", "A.001"), ("A", "A: B"), ("A: B", "A", "A: B: C"), ("Left", "Leftover")]
+)
+def test_names_are_left_out_of_a_report_whole(package, names):
+    """Also where one begins as another does."""
+    report, last_run = package("operators.report"), package("session.last_run")
+    for name in names:
+        scenes.cube(name).name = name
+    for name in names:
+        assert report._nameless(f"{name}: It has holes: two.") == "It has holes: two."
+        last_run.keep(last_run.Summary("Unwrap", (("Shear", "1.1"),), (last_run.Notice(f"{name}: It is bent."),), ()))
+        last_run.state.error = f"{name}: It is closed."
+        lines = report.report_text(bpy.context).splitlines()
+        assert "  warning: It is bent." in lines and "last error: It is closed." in lines
+        assert "  Shear: 1.1" in lines and "last run: Unwrap" in lines
+    assert report._nameless("No mesh is selected.") == "No mesh is selected."
+    last_run.forget()
+    last_run.state.error = ""
+
+
 @pytest.mark.parametrize(("selected", "touched"), [([], [2]), ([1], [2]), ([], [])])
 def test_objects_of_which_nothing_is_touched_are_left_out_in_edit_mode(package, monkeypatch, selected, touched):
     live, mesh = package("operators.live"), package("blender.mesh")

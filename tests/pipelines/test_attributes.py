@@ -54,6 +54,34 @@ def test_marks_away_from_the_lines_are_left_and_named():
     assert [layer.name for layer in found.marks.layers] == ["near"] and found.left == ("far",)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_marks_go_along_exactly_where_all_of_them_are_on_lines(seed):
+    """By loops over edges of all kinds of layers; edges and lines have their ends either way round."""
+    rng = np.random.default_rng(seed)
+    every = np.array(list(itertools.combinations(range(6), 2)))
+    edges = every[rng.permutation(len(every))[:8]]
+    lines = np.concatenate([edges[rng.random(8) < 0.7], every[rng.random(len(every)) < 0.2]])[:, ::-1]
+    layers = []
+    for width in (1, 2, 3):
+        for share in (0.1, 0.4, 1.0):
+            values = rng.integers(-2, 3, (8, width)) * (rng.random((8, width)) < share)
+            layers.append(Layer(f"{width} {share}", "EDGE", "INT", values[:, 0] if width == 1 else values))
+    none = np.zeros(8, bool)
+    there = {frozenset(line) for line in lines.tolist()}
+    stays = [
+        layer.name
+        for layer in layers
+        if all(
+            frozenset(edge) in there or not np.any(value)
+            for edge, value in zip(edges.tolist(), layer.values, strict=True)
+        )
+    ]
+    found = followed(carried(np.zeros((1, 3)), Marks(edges, none, none, none, tuple(layers))), lines)
+    assert [layer.name for layer in found.marks.layers] == stays
+    assert found.left == tuple(layer.name for layer in layers if layer.name not in stays)
+    np.testing.assert_array_equal(found.marks.edges, edges)
+
+
 def test_uv_seams_are_where_any_map_jumps():
     V, F = meshes.grid(2, 3)
     surface, uv = triangle_surface(V, F), V[F.ravel(), :2]
