@@ -388,3 +388,22 @@ def test_results_that_go_below_the_folder_of_the_files_are_no_files_of_it(tmp_pa
         (tmp_path / name).write_bytes(b"x")
     found = plan._of_folder(tmp_path, tmp_path / "out")
     assert [name for name, _ in found] == ["a.obj", "sub/c.obj", "sub/out/g.obj"]
+
+
+@pytest.mark.parametrize("parts", [("abcdef",), ("af", "bcde"), ("f", "e", "dcba"), ("bd", "", "fae", "c")], ids=str)
+def test_rows_of_all_parts_are_those_of_the_whole_in_the_order_of_names(tmp_path, parts):
+    """Whichever part is read first, and however its files came."""
+    paths = []
+    for k, names in enumerate(parts):
+        paths.append(tmp_path / f"out.part{k + 1}of{len(parts)}{plan.MANIFEST}")
+        with manifest.Manifest(paths[-1]) as mine:
+            tasks = [plan.FileTask(name, tmp_path / name, ord(name), 1, None) for name in names]
+            mine.due(PLAN, tasks, False)
+            for task in tasks:
+                mine.begin(task)
+                mine.end(PLAN, task, child.Record(ord(task.name) % 2, 1.0))
+    for order in (paths, paths[::-1]):
+        rows = manifest.rows_of(order)
+        assert [(row["name"], row["size"]) for row in rows] == [(name, ord(name)) for name in "abcdef"]
+        assert [row["state"] for row in rows] == ["failed", "done"] * 3
+    assert sorted(manifest.found_beside(tmp_path / "out")) == sorted(paths)

@@ -174,3 +174,45 @@ def test_objects_whose_materials_are_left_out_are_counted(package, tmp_path, nam
     told = package("files.export").export(tmp_path / "made.obj", ".obj", objects, False)
     alike = len({name.replace(" ", "_") for name in names}) < len(names)
     assert told == ([f"Materials of {len(names)} objects were left out of the OBJ file"] if alike else [])
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_every_object_is_counted_when_it_is_read_back_also_one_of_several_with_one_mesh(package, tmp_path, suffix):
+    """A format that holds a mesh once for all of its objects is asked for it once."""
+    A, B = patches()[:2]
+    for obj in (A, B):
+        obj.data.materials.clear()
+    C, D = A.copy(), A.copy()
+    objects = [C, A, B, D]
+    for k, obj in enumerate((C, D)):
+        obj.name, obj.location.z = "CD"[k], 3.0 + k
+        bpy.context.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+    check, error = package("files.read_back").check, package("files.verified").FileError
+    once = suffix in (".glb", ".gltf", ".fbx")
+    for left_out in (None, *objects):
+        some = [obj for obj in objects if obj != left_out]
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}{suffix}"
+        package("files.export").export(path, suffix, some, False)
+        check(path, suffix, some)
+        if left_out is None or (once and left_out != B):
+            check(path, suffix, objects)
+        else:
+            with pytest.raises(error, match="instead of"):
+                check(path, suffix, objects)
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))), ids=str)
+@pytest.mark.parametrize("far", [(1e6, 0, 0), (1e4, 1e6, 1e5), (0, 3e5, 3e6)], ids=str)
+def test_what_single_precision_rounds_is_told_of_the_farthest_object(package, tmp_path, far, order):
+    objects = [scenes.bump(2, 2, name=name) for name in "ABC"]
+    for obj, at in zip(objects, far, strict=True):
+        for vertex in obj.data.vertices:
+            vertex.co.y += at
+    (tmp_path / "in.obj").write_text("")
+    found = package("files.loaded").compare(tmp_path / "in.obj", [objects[k] for k in order])
+    step = float(np.spacing(np.float32(max(far) + 1))) / 2
+    assert found.loss == step and not found.moved
+    assert found.texts == (
+        f"Coordinates are so far from the origin that single precision rounds them by up to {step:.2g}",
+    )

@@ -320,6 +320,24 @@ def test_what_is_said_of_many_objects_is_said_once(package, count):
     ]
 
 
+@pytest.mark.parametrize("counts", [(1,), (5,), (1, 4), (2, 2, 2), (6, 1, 1), (1, 1, 1, 1), (3, 1, 2, 2, 1)], ids=str)
+def test_several_texts_of_one_object_are_no_more_objects(package, counts):
+    """The same is said once for all from four objects on, however often it is said of each."""
+    base, state = package("operators.base"), package("session.last_run").state
+    objects, told = [SimpleNamespace(name=f"Part {k}") for k in range(len(counts))], []
+    operator = SimpleNamespace(report=lambda kind, text: told.append(text))
+    texts = [(k, f"{10 * k + j} edges are bent") for k, count in enumerate(counts) for j in range(count)]
+    before = list(state.notices)
+    try:
+        base.warn(operator, objects, texts)
+    finally:
+        state.notices[:] = before
+    if len(counts) > base.MOST_NAMED:
+        assert told == [f"Part 0 and {len(counts) - 1} other objects: 0 edges are bent"]
+    else:
+        assert told == [f"Part {k}: {text}" for k, text in texts]
+
+
 @pytest.mark.parametrize("own", [(), ("Shear",), ("Shear", "Overlap"), ("Area error", "Shear", "Folded faces")])
 def test_rows_that_an_operator_says_itself_stand_for_those_measured_and_are_never_marked(package, monkeypatch, own):
     """A sign of what is out of bounds belongs to the figure that was judged, not to another one of its name."""

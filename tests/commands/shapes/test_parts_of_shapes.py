@@ -130,6 +130,40 @@ def test_neighbours_tell_classes_and_those_of_others_where_owners_are_given(
     assert "is no table of names and classes" in run(*words)[2]
 
 
+def classes_by_loops(away, classes, owners, count):
+    """The share, in percent, of shapes whose nearest others of other owners are mostly of their class."""
+    right = 0
+    for k, row in enumerate(away.tolist()):
+        near = [j for j in np.argsort(row, kind="stable") if j != k and (not owners[k] or owners[j] != owners[k])][
+            :count
+        ]
+        votes = [[classes[j] for j in near].count(classes[i]) for i in near]
+        # The nearest has the word where several have as many.
+        told = classes[near[votes.index(max(votes))]] if near else min(classes)
+        right += told == classes[k]
+    return 100 * right / len(classes)
+
+
+@pytest.mark.parametrize(("owners", "count"), [("aabbccdd ", 3), ("a        ", 1)])
+def test_neighbours_are_those_of_others_and_what_is_nobodys_is_of_nobody(owners, count, index, run, package, tmp_path):
+    module = package("pipelines.shapes.signature_index")
+    read = module.read_index(index)
+    upper = sum(np.pad(module.block_distances(read, (i, j, k, m))[1], ((i, SHAPES - j), (k, SHAPES - m)))
+                for i, j, k, m in module.blocks_of(SHAPES))  # fmt: skip
+    classes, whose = list("abcabcabd"), [owner.strip() for owner in owners]
+    lines = [f"{name},{kind},{owner}" for name, kind, owner in zip(read.names, classes, whose, strict=True)]
+    (tmp_path / "l.csv").write_text("\n".join(lines))
+    words = ["distances", index, "-o", tmp_path / "d.csv", "--labels", tmp_path / "l.csv", "--knn", count]
+    status, out, err = run(*words)
+    assert (status, err) == (0, "")
+    away = upper + upper.T
+    every, others = (classes_by_loops(away, classes, each, count) for each in ([""] * SHAPES, whose))
+    assert out.splitlines()[1:] == [
+        f"{every:.1f} % of the classes are those of {count} neighbours",
+        f"{others:.1f} % are those of {count} neighbours of others",
+    ]
+
+
 @pytest.mark.parametrize("received", [0, 15])
 @pytest.mark.parametrize("scheduler", ["", "local"])
 def test_a_batch_of_shapes_is_carried_out_by_what_was_chosen(

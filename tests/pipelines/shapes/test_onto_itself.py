@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from omt_uv.pipelines.attributes import Attributes, Layer, Marks, ShapeKey
+from omt_uv.pipelines.shapes import onto
 from omt_uv.pipelines.shapes.onto import transferred
 
 
@@ -67,3 +69,25 @@ def test_every_element_keeps_its_own(kind):
         np.testing.assert_allclose(new.values, old.values, atol=1e-6, err_msg=old.name)
     np.testing.assert_allclose(found.weights, given.weights, atol=1e-9)
     np.testing.assert_allclose(found.keys[0].offsets, given.keys[0].offsets, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["triangles", "quads", "mixed"])
+def test_polygons_that_reach_across_are_counted_and_not_their_triangles(monkeypatch, kind, seed):
+    V, polygons = body(kind)
+    surface = meshes.polygon_surface(V, polygons)
+    rng = np.random.default_rng(seed)
+    across = np.flatnonzero(rng.random(len(surface.triangles)) < (0.1, 0.6, 1.0)[seed])
+    corners = surface.corner_vertex[surface.triangles]
+    first = np.zeros(len(V), np.int64)
+    first[corners.ravel()] = np.arange(corners.size)
+    result = SimpleNamespace(source_faces=first // 3, source_barycentric=np.eye(3)[first % 3])
+    none = np.zeros((0, 2), np.int64)
+    job = SimpleNamespace(source=surface, target=surface, jumps=none)
+    marks = Marks(none, np.zeros(0, bool), np.zeros(0, bool), np.zeros(0, np.float32))
+    given = Attributes(np.zeros(len(polygons), np.int64), np.zeros(len(polygons), bool), marks)
+    true = onto.correspond
+    monkeypatch.setattr(onto, "correspond", lambda *words: replace(true(*words), extended=len(across)))
+    monkeypatch.setattr(onto, "_across", lambda at: across)
+    expected = len({int(surface.triangle_face[k]) for k in across})
+    assert transferred(job, result, given)[1] == expected and expected
