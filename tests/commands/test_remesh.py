@@ -143,3 +143,20 @@ def test_glb_is_joined_where_the_format_had_to_split_it(run, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
     mesh = bpy.data.objects["Cube_remesh"].data
     assert len(mesh.vertices) - len(mesh.edges) + len(mesh.polygons) == 2
+
+
+def test_a_preview_of_a_series_shows_the_coarsest_of_every_object(run, package, tmp_path, monkeypatch):
+    for k, name in enumerate("AB"):
+        scenes.bump(3, 2, name=name, offset=2.0 * k)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    shown = []
+    monkeypatch.setattr(package("commands.remesh"), "write_preview", lambda _, pairs: shown.extend(pairs))
+    words = ["remesh", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--preview", tmp_path / "p.png"]
+    assert run(*words, "--vertices", 24, "--levels", 2, "--no-attributes")[0] == 0
+    found = {obj.name: (len(obj.data.vertices), len(reading.surface.positions)) for obj, reading in shown}
+    assert [name[0] for name in found] == ["A", "B"] and all(one == other for one, other in found.values())
+    fewest = {
+        letter: min(len(obj.data.vertices) for obj in bpy.data.objects if obj.name.startswith(f"{letter}_"))
+        for letter in "AB"
+    }
+    assert [count for count, _ in found.values()] == list(fewest.values())

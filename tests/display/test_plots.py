@@ -75,3 +75,15 @@ def test_discs_at_the_edge_of_a_picture_are_those_of_a_larger_one(package):
             plots.dots(large, middle[None] + 100, (0.2, 0.4, 0.1), radius)
         np.testing.assert_allclose(small, large[100:130, 100:140], atol=1e-12)
         assert small.min() < 0.5
+
+
+@pytest.mark.parametrize("cloud", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_curve_is_drawn_from_left_to_right_however_its_points_come(package, cloud, seed):
+    plots = package("display.plots")
+    rng = np.random.default_rng(seed)
+    points = [(10.0 * 3**k, 2.0 + rng.random()) for k in range(6)] + [(0.0, 1.0), (5.0, -1.0)]
+    ordered = plots.plot({"a": points, "b": [(y, x) for x, y in points[:3]]}, "title", cloud)
+    mixed = [points[k] for k in rng.permutation(len(points))]
+    found = plots.plot({"a": mixed, "b": [(y, x) for x, y in points[2::-1]]}, "title", cloud)
+    np.testing.assert_allclose(found, ordered, atol=1e-9)

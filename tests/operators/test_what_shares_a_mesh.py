@@ -151,3 +151,37 @@ def test_what_is_shown_goes_whole_when_it_is_hidden(kind, times, colours, slots)
             assert getattr(getattr(bpy.ops, module), verb)(**arguments) == {"FINISHED"}
     found = whole_file.changed(before, whole_file.told())
     assert not found, found[:20]
+
+
+@pytest.mark.parametrize("chosen", [(1,), (0, 2)], ids=str)
+def test_modifiers_that_change_areas_are_told_of_every_object_that_has_some(capfd, chosen):
+    objects = [body("ABC"[k], k) for k in range(3)]
+    for k in chosen:
+        objects[k].modifiers.new(f"Bent {k}", "SIMPLE_DEFORM")
+    # One that nobody sees.
+    hidden = objects[1].modifiers.new("Hidden", "SIMPLE_DEFORM")
+    hidden.show_viewport = hidden.show_render = False
+    scenes.select(objects)
+    lines = lines_told(capfd, "uv.omt_unwrap", **DRAFT, max_shear=0.0, use_subdivision=True)
+    told = sorted(line.partition(": ")[2] for line in lines if "modifiers" in line)
+    assert [text.partition(":")[0] for text in told] == ["ABC"[k] for k in chosen]
+    for k, text in zip(chosen, told, strict=True):
+        assert f"Bent {k}" in text and "Hidden" not in text
+
+
+@pytest.mark.parametrize(("hide", "sharers"), [(False, 0), (True, 2)])
+def test_all_objects_that_new_ones_stand_in_for_are_hidden_or_none(hide, sharers):
+    objects = [body("A", 0), body("B", 1)]
+    for k in range(sharers):
+        obj = objects[k % 2].copy()
+        obj.name, obj.location.z = f"C{k}", 2.0 + k
+        bpy.context.collection.objects.link(obj)
+        objects.append(obj)
+    beside = body("D", 2)
+    scenes.select(objects)
+    bpy.context.view_layer.update()
+    assert bpy.ops.object.omt_remesh(target_vertices=30, hide_original=hide) == {"FINISHED"}
+    assert [obj.hide_get() for obj in objects] == [hide] * len(objects) and not beside.hide_get()
+    new = [obj for obj in bpy.data.objects if obj not in objects and obj != beside]
+    assert len(new) == len(objects) and not any(obj.hide_get() for obj in new)
+    assert set(bpy.context.selected_objects) == set(new)

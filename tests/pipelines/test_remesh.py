@@ -53,6 +53,19 @@ def test_faces_and_edge_lengths_are_counted():
     assert edge.mean() == pytest.approx(0.6, rel=0.05)
 
 
+@pytest.mark.parametrize("count_of", ["vertices", "faces"])
+@pytest.mark.parametrize("count", [41, 60, 97])
+@pytest.mark.parametrize(("levels", "ratio"), [(1, 0.5), (2, 0.5), (4, 0.37)])
+def test_the_first_level_has_the_count_that_is_asked_and_later_ones_even_faces(count_of, count, levels, ratio):
+    V, F = meshes.icosphere(1)
+    settings = RemeshSettings(count_of=count_of, count=count, levels=levels, ratio=ratio)
+    kind, found = remeshing._counts(triangle_surface(V, F), F, settings)
+    assert (kind, found[0]) == (count_of, count) and len(found) == levels
+    for k in range(1, levels):
+        asked = round(count * ratio**k)
+        assert found[k] == asked + (asked % 2 if count_of == "faces" else 0)
+
+
 @pytest.mark.parametrize(
     "settings",
     [{"count": 0}, {"count": np.nan}, {"count_of": "edge", "count": -1}, {"levels": 2, "ratio": 1.0}, {"count": 3}],

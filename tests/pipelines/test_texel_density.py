@@ -94,3 +94,28 @@ def test_nothing_to_measure_is_an_error():
             texel_density([wrong], TEXELS)
     with pytest.raises(ZeroAreaFaceError, match="The faces have no area in space, or none in"):
         texel_density([reading(V, F, 0 * uv)], TEXELS)
+
+
+@pytest.mark.parametrize("flat", ["space", "texture"])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_islands_without_an_area_stay_as_they_are_beside_others(flat, place):
+    """Of three islands one is a line, in space or in the texture."""
+    parts = [meshes.grid(2, 2) for _ in range(3)]
+    V, F = together(*parts)
+    uv = V[:, :2] * 0.2 + np.repeat([[0.0, 0.0], [0.4, 0.3], [0.1, 0.7]], 9, axis=0)
+    mine = slice(9 * place, 9 * place + 9)
+    if flat == "space":
+        V = V.copy()
+        V[mine, 1] = 0.0
+    else:
+        uv[mine, 1] = uv[mine, 1].mean()
+    given = reading(V, F, uv)
+    ((corners, found),) = with_texel_density([given], 100.0, TEXELS, True)
+    assert len(corners) == len(found) == F.size
+    before, vertex = given.uv[corners].astype(float), given.surface.corner_vertex[corners]
+    here = (vertex >= mine.start) & (vertex < mine.stop)
+    np.testing.assert_allclose(found[here], before[here], atol=1e-12)
+    grown = np.ptp(found[~here & (vertex < 9 * (3 if place < 2 else 1))], axis=0) / np.ptp(
+        before[~here & (vertex < 9 * (3 if place < 2 else 1))], axis=0
+    )
+    assert np.isfinite(found).all() and not np.allclose(grown, 1)

@@ -12,6 +12,7 @@ import bpy
 
 import numpy as np
 import pytest
+import scenes
 
 SHAPES = 9
 
@@ -162,6 +163,20 @@ def test_neighbours_are_those_of_others_and_what_is_nobodys_is_of_nobody(owners,
         f"{every:.1f} % of the classes are those of {count} neighbours",
         f"{others:.1f} % are those of {count} neighbours of others",
     ]
+
+
+@pytest.mark.parametrize("other", [0, 7])
+def test_the_last_vertex_may_be_a_marker_and_none_behind_it(other, package, tmp_path):
+    module, error = package("commands.shapes.distance"), package("commands.common").CommandError
+    obj = scenes.cube()
+    for number in (0, 1, 7, 8, 9):
+        for pair in ((number, other), (other, number)):
+            options = argparse.Namespace(markers=tuple(map(str, pair)))
+            if number < len(obj.data.vertices):
+                assert len(module._markers(options, tmp_path, [(obj, None)])) == 1
+            else:
+                with pytest.raises(error, match=f"no vertex {number}. It has 8, from 0"):
+                    module._markers(options, tmp_path, [(obj, None)])
 
 
 @pytest.mark.parametrize("received", [0, 15])

@@ -112,3 +112,20 @@ def test_textures_are_hidden_with_the_last_checker_only(package, monkeypatch):
         scenes.select([obj])
         bpy.ops.uv.omt_checker_remove()
         assert len(hidden) == (k == 2)
+
+
+@pytest.mark.parametrize("worn", [(), (0,), (0, 1), (0, 1, 2)], ids=str)
+@pytest.mark.parametrize("selected", [(), (0,), (2,), (0, 1), (0, 2), (0, 1, 2)], ids=str)
+def test_textures_are_shown_as_long_as_anybody_wears_a_checker(package, monkeypatch, worn, selected):
+    """Selected or not; of those that wear one the selected ones lose it, or all, if none is selected."""
+    objects = [scenes.bump(2, 2, name="ABC"[k], offset=2.0 * k) for k in range(3)]
+    checker, hidden = package("blender.checker"), []
+    for k in worn:
+        checker.put(objects[k], "COLOR_GRID", 64)
+    monkeypatch.setattr(package("operators.inspection.checker").shading, "hide_textures", hidden.append)
+    scenes.select([objects[k] for k in selected])
+    assert bpy.ops.uv.omt_checker_remove() == {"FINISHED"}
+    left = [k for k in worn if checker.wears_one(objects[k])]
+    lose = [k for k in worn if k in selected] or list(worn)
+    assert left == [k for k in worn if k not in lose]
+    assert bool(hidden) == (not left)

@@ -75,6 +75,30 @@ def test_a_region_stays():
     np.testing.assert_array_equal(found.frames[-1][0][low.stays], low.positions[low.stays])
 
 
+@pytest.mark.parametrize("keeping", [(0,), (1,), (2,), (0, 2), (1, 2)], ids=str)
+def test_of_several_bodies_each_keeps_its_own_region(keeping):
+    """Those that keep none, and what of them is not kept, go along with what is moved."""
+    V, F = icosphere(1)
+    sizes, bodies = (1.0, 0.6, 0.8), []
+    for k, size in enumerate(sizes):
+        # The bodies differ in their numbers of vertices, too.
+        more = np.zeros((k, 3)) + [0.1, 0.2, 0.3 * k]
+        positions = np.concatenate([size * V + [2.5 * k, 0, 0], more])
+        stays = np.zeros(len(positions), bool)
+        stays[: len(V)] = V[:, 2] < -0.5
+        bodies.append(FlowBody("abc"[k], positions, F, stays if k in keeping else None))
+    handles = []
+    for k, body in enumerate(bodies):
+        top = np.flatnonzero(V[:, 2] > 0.8)
+        handles.append((k, FlowHandle(body.positions[top], body.positions[top] + [0.0, 0.15, 0.0], top)))
+    (shapes,) = drain(flow_bodies(FlowJob(tuple(bodies), tuple(handles)))).frames
+    for k, (body, shape) in enumerate(zip(bodies, shapes, strict=True)):
+        low = np.flatnonzero(V[:, 2] < -0.5)
+        same = np.array_equal(shape[low], body.positions[low])
+        assert same == (k in keeping), k
+        np.testing.assert_array_equal(shape[handles[k][1].vertices], handles[k][1].end)
+
+
 def test_uvs_keep_their_areas_and_pins():
     x = np.linspace(0, 1, 41)
     uv = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
