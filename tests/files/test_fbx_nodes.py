@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 import pytest
-from fbx_bytes import file_of, scene
+from fbx_bytes import array, file_of, scene, text
 
 from omt_uv.files import fbx_nodes
 from omt_uv.files.verified import FileError
@@ -33,3 +33,11 @@ def test_values_that_reach_beyond_their_record_are_refused():
     (size,) = struct.unpack_from("<I", data, at)
     with pytest.raises(FileError, match="too early"):
         fbx_nodes.count(data[:at] + struct.pack("<I", size + 1) + data[at + 4 :])
+
+
+@pytest.mark.parametrize("lengths", [(4,), (4, 9), (9, 4), (0, 5), (3, 0, 7)], ids=str)
+@pytest.mark.parametrize("before", [0, 2])
+def test_the_length_of_a_record_is_that_of_its_first_array_that_holds_something(lengths, before):
+    values = [text(b"name")] * before + [array(b"i", "i", range(n)) for n in lengths]
+    data = b"".join(values)
+    assert fbx_nodes._values(data, 0, len(values), len(data)) == (next(n for n in lengths if n), "name" * (before > 0))

@@ -185,3 +185,5 @@ def test_all_objects_that_new_ones_stand_in_for_are_hidden_or_none(hide, sharers
     new = [obj for obj in bpy.data.objects if obj not in objects and obj != beside]
     assert len(new) == len(objects) and not any(obj.hide_get() for obj in new)
     assert set(bpy.context.selected_objects) == set(new)
+    # Each knows the one that it stands in for.
+    assert {obj.name: obj["omt_uv_source"].name for obj in new} == {f"{obj.name}_remesh": obj.name for obj in objects}

@@ -187,3 +187,24 @@ def test_escape_in_the_window_keeps_what_is_done_and_closes_what_is_not(package,
     assert operator.modal(bpy.context, event("ESC", "PRESS")) == {"PASS_THROUGH"}
     assert operator.modal(bpy.context, event("TIMER")) == {"CANCELLED"}
     assert steps.gi_frame is None and not first.data.uv_layers and not second.data.uv_layers
+
+
+@pytest.mark.parametrize("there", [False, True])
+@pytest.mark.parametrize("setting", ["keep_free", "centre_group", "start_group", "corner_group"])
+def test_a_group_that_none_of_the_objects_has_is_named_before_anything_is_begun(package, setting, there):
+    objects = [scenes.bump(name="A"), scenes.bump(name="B", offset=2)]
+    if there:
+        # One of them is enough.
+        objects[1].vertex_groups.new(name="mine").add([0], 1.0, "REPLACE")
+    scenes.select(objects)
+    queue = package("operators.arranging.queue")
+    chosen = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    setattr(chosen, setting, "mine")
+    try:
+        if there:
+            queue._check_groups(bpy.context, objects)
+        else:
+            with pytest.raises(package("operators.base").Complaint, match="no vertex group 'mine'"):
+                queue._check_groups(bpy.context, objects)
+    finally:
+        chosen.property_unset(setting)

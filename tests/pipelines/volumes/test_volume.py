@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bodies import icosphere, limbed
 
+from omt_uv.pipelines.volumes import volume
 from omt_uv.pipelines.volumes.volume import VolumeBody, VolumeSettings, mapped_volume
 from omt_uv.pipelines.volumes.vtu import vtu_text
 from omt_uv.solver.errors import HandleError
@@ -33,6 +35,37 @@ def test_a_body_goes_into_another_with_its_landmarks():
     assert report["tetrahedra"] == len(found.map.tets) and sum(report["log2_dilation_histogram"]) > 0
     with pytest.raises(HandleError, match="no other body"):
         drain(mapped_volume(one, settings))
+
+
+@pytest.mark.parametrize("count", range(6))
+def test_three_landmarks_of_one_name_turn_a_body_and_fewer_do_not(monkeypatch, count):
+    """Each is the middle of its vertices; those of one body alone do not count."""
+    V, F = icosphere(1)
+    one = SimpleNamespace(positions=V, points=V, tets=np.array([[0, 1, 2, 3]]))
+    other = SimpleNamespace(positions=2 * V, points=V, tets=one.tets)
+    names = [f"LM_{k}" for k in range(count)]
+    first = {name: np.array([k, k + 7]) for k, name in enumerate(names)} | {"mine": np.array([3])}
+    second = {name: np.array([k + 1]) for k, name in reversed(list(enumerate(names)))} | {"yours": np.array([5])}
+    asked = []
+
+    def steps(found):
+        return found
+        yield
+
+    def registered(positions, mine, theirs):
+        asked.append((mine, theirs))
+        return steps(SimpleNamespace(positions=positions))
+
+    bodies = iter([one, other])
+    monkeypatch.setattr(volume, "_mapped", lambda body, domain, settings: steps((body, next(bodies))))
+    monkeypatch.setattr(volume, "registered", registered)
+    monkeypatch.setattr(volume, "into_body", lambda first, second, placed: steps(first))
+    monkeypatch.setattr(volume, "TetLocation", lambda *_: SimpleNamespace(values=lambda *given: given[0]))
+    drain(mapped_volume(VolumeBody("one", V, F, first), VolumeSettings("body"), VolumeBody("other", V, F, second)))
+    assert len(asked) == (count >= 3)
+    for mine, theirs in asked:
+        np.testing.assert_allclose(mine, [(V[k] + V[k + 7]) / 2 for k in range(count)])
+        np.testing.assert_allclose(theirs, [2 * V[k + 1] for k in range(count)])
 
 
 def test_a_vtu_file_holds_what_it_is_given():
