@@ -254,3 +254,11 @@ def test_a_table_has_every_value_as_it_is_also_none_at_all(package):
         assert line["tries"] == ("" if value is None else str(value))
         assert line["of mine"] == (str(value) if isinstance(value, int | float) and value is not False else
                                    "0" if value is False else "")  # fmt: skip
+
+
+def test_causes_are_those_of_what_has_failed_and_of_nothing_that_waits_or_runs(package):
+    states = ("done", "failed", "set aside", "running", "waiting")
+    rows = [row(f"{k}{j}.obj", state, message=f"{state} it is") for k, state in enumerate(states) for j in range(k + 1)]
+    summary = package("batch.statistics").summary_of(rows)
+    assert summary.counts == {state: k + 1 for k, state in enumerate(states)}
+    assert summary.causes == {"set aside it is": 3, "failed it is": 2}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import io
 import json
@@ -44,3 +45,17 @@ def test_what_cannot_be_compared_or_drawn_is_one_line(run, bump):
     for words in (["none.obj"], ["in.obj", "--plot", bump / "p.jpg"], ["in.obj", "--plot", bump / "none" / "p.png"]):
         status, out, err = run("compare", bump / "in.obj", bump / words[0], *words[1:])
         assert (status, out) == (1, "") and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_all_objects_of_a_file_are_compared_together(package, monkeypatch, count):
+    """Vertices and triangles of each come behind those of the ones before."""
+    command, parts = package("commands.compare"), []
+    for k in range(count):
+        V, F = meshes.bumpy(2 + k, 3)
+        parts.append((V + [3.0 * k, 0, 0], F))
+    monkeypatch.setattr(command, "read_file", lambda options: [(None, part) for part in parts])
+    monkeypatch.setattr(package("blender.measuring.distances"), "placed_mesh", lambda obj, part: part)
+    positions, triangles = command._mesh(argparse.Namespace(), "in.blend")
+    expected = [V[triangle].tolist() for V, F in parts for triangle in F]
+    assert positions[triangles].tolist() == expected and len(positions) == sum(len(V) for V, _ in parts)

@@ -388,3 +388,23 @@ def test_images_of_gltf_that_stay_behind_are_named(package, run, tmp_path):
     status, _, err = run("unwrap", tmp_path / "in.glb", "-o", tmp_path / "there" / "out.glb", "--quality", "draft")
     assert status == 0, err
     assert "far away.png, which is not in its folder" in err
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.004, 0.3, 1.5707963])
+@pytest.mark.parametrize("suffix", [".fbx", ".glb", ".gltf", ".blend"])
+def test_objects_stand_where_they_stood_also_next_to_the_axes(package, tmp_path, suffix, turn):
+    scenes.open_empty()
+    obj = scenes.bump(2, 2, name="A")
+    obj.rotation_euler, obj.location = (0.0, turn, 0.0), (0.003, -2.0, 0.5 + turn)
+    bpy.context.view_layer.update()
+    points = np.array([obj.matrix_world @ v.co for v in obj.data.vertices])
+    path = tmp_path / f"made{suffix}"
+    if suffix == ".blend":
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    else:
+        package("files.export").export(path, suffix, [obj], False)
+    (again,) = package("files.meshes").load(path)
+    bpy.context.view_layer.update()
+    found = np.array([again.matrix_world @ v.co for v in again.data.vertices])
+    order = [np.lexsort(np.round(x, 4).T) for x in (points, found)]
+    np.testing.assert_allclose(found[order[1]], points[order[0]], atol=2e-5)

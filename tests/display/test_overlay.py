@@ -230,3 +230,17 @@ def test_densities_are_counted_for_the_unit_that_was_chosen(unit, metres):
     bpy.ops.uv.omt_density_get(texture_size=1024, unit="M")
     target = bpy.context.window_manager.operator_properties_last("uv.omt_density_set")
     assert target.density == pytest.approx(8.0 / metres, rel=1e-4) and target.unit == "M"
+
+
+@pytest.mark.parametrize("size", [(4, 6), (8, 8)], ids=str)
+def test_pictures_for_panels_stand_upright(package, size):
+    """Blender's rows begin at the bottom, ours at the top; as images, and as what panels show."""
+    canvas = package("display.canvas")
+    picture = np.random.default_rng(0).random((*size, 4)).astype(np.float32)
+    picture[..., 3] = 1.0
+    image = canvas.show("Upright", picture[..., :3].astype(float))
+    canvas.set_preview(image, picture)
+    assert tuple(image.size) == tuple(image.preview.image_size) == size[::-1]
+    found = np.array(image.preview.image_pixels_float[:]).reshape(*size, 4)
+    np.testing.assert_allclose(found[::-1], picture, atol=1 / 128)
+    np.testing.assert_allclose(np.array(image.pixels[:]).reshape(*size, 4)[::-1], picture, atol=1 / 128)

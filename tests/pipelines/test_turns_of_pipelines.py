@@ -16,7 +16,9 @@ from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.measuring import region_figures
 from omt_uv.pipelines.regions import several
 from omt_uv.pipelines.shapes import onto
+from omt_uv.settings import RefineSettings
 from omt_uv.solver.errors import FoldedUVError, MeshError
+from omt_uv.solver.progress import drain
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -615,3 +617,22 @@ def test_diameters_are_the_greatest_distances():
                    np.array([[0.0, 1], [0, 5], [0, -2]]), np.array([[3.0, 1], [1, 1], [2, 1]])):  # fmt: skip
         apart = np.linalg.norm(points[:, None] - points[None], axis=2).max()
         assert region_figures.diameter(points) == pytest.approx(apart)
+
+
+@pytest.mark.parametrize("count", range(4))
+def test_an_island_has_a_scale_of_its_own_from_two_pins_on(monkeypatch, count):
+    """One pin holds a place, and no length."""
+    V, F = meshes.grid(2, 2)
+    chart = SimpleNamespace(vertices=V, triangles=F, faces=np.arange(len(F)))
+    rows = np.array([0, 8, 2, 6])[:count]
+    pins = SimpleNamespace(vertices=rows, places=V[rows, :2]) if count else None
+
+    def refine_island(*_, pins, **more):
+        return pins
+        yield
+
+    monkeypatch.setattr(refinement, "refine_island", refine_island)
+    island = SimpleNamespace(chart=chart, uv=V[:, :2])
+    fixed, given = drain(refinement._improve(island, pins, RefineSettings(), None))
+    assert fixed == (count > 1) and (given is None) == (count == 0)
+    assert given is None or given[0].tolist() == rows.tolist()

@@ -200,3 +200,30 @@ def test_pins_have_places_of_their_own_in_whatever_order_they_come(package, sess
     of_chart = island.chart.vertices
     for pin, v in zip(made.pin_corners, vertices, strict=True):
         np.testing.assert_allclose(obj.data.vertices[corner[pin]].co[:], of_chart[v], atol=1e-6)
+
+
+def test_faces_of_islands_that_lie_among_others_are_counted_apart(package, session):
+    """Numbers of polygons that an island has, and those that it leaves out, are no others' for that."""
+    objects = []
+    for k in range(2):
+        obj = scenes.bump(4, 4 + k, 0.4 + 0.1 * k, "AB"[k], offset=3.0 * k)
+        uv = 0.2 * scenes.seen_from_above(obj, shift=(-3.0 * k, 0.1 * k))
+        right = np.repeat([face.index % 4 >= 2 for face in obj.data.polygons], 4)
+        scenes.set_uv(obj, np.where(right[:, None], uv * [0.7, 1.3] + [0.5, 0.0], uv))
+        objects.append(obj)
+    scenes.select(objects)
+    live = session(*objects)
+    assert len(live._islands) == 4
+    asked, given = package("solver.maps.distortion"), []
+    true = asked.distortion
+
+    def distortion(*words, **more):
+        given.append(more["polygons"])
+        return true(*words, **more)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(asked, "distortion", distortion)
+        live.figures()
+    # Two triangles of each face, and no number twice.
+    (polygons,) = given
+    assert np.unique(polygons, return_counts=True)[1].tolist() == [2] * (16 + 20)

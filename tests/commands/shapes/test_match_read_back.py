@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import bpy
 
@@ -117,3 +118,22 @@ def test_landmarks_are_told_by_name_with_how_far_they_are_from_their_partners(ma
     for name, value in report["landmarks"].items():
         away = np.linalg.norm(W[own[name]] - target[partner[name]])
         assert value == pytest.approx(away / size, abs=1e-4), name
+
+
+@pytest.mark.parametrize("across", [0, 1, 4])
+def test_faces_that_reach_across_a_seam_are_told_of(package, run, tmp_path, monkeypatch, across):
+    for name in ("in", "to"):
+        scenes.open_empty()
+        V, F = blob(1, seed=1)
+        scenes.add(V * [1.0, 1.3, 0.8], F, name)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{name}.blend"))
+    # A surface that is matched with itself gets what it has.
+    found = SimpleNamespace(report=dict)
+    module = package("commands.shapes.match")
+    monkeypatch.setattr(module, "_match", lambda _, source, target: (found, (source[1].attributes, across), ["one"]))
+    words = ["match", tmp_path / "in.blend", tmp_path / "to.blend", "-o", tmp_path / "out.blend"]
+    status, _, err = run(*words, "--report", tmp_path / "r.json")
+    assert status == 0, err
+    first, *told = json.loads((tmp_path / "r.json").read_text())["warnings"]
+    who = {0: [], 1: ["A face reaches across a seam"], 4: ["4 faces reach across a seam"]}[across]
+    assert first == "one" and [text.partition(";")[0] for text in told] == who and all(text in err for text in told)

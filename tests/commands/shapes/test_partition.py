@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import bpy
 
@@ -70,3 +71,27 @@ def test_capacities_follow_a_group(run, tmp_path):
     assert np.mean(np.array(points) > 0.45) > 0.9
     status, _, err = run("partition", tmp_path / "in.blend", "-o", tmp_path / "x.blend", *words[:-1], "light")
     assert status == 1 and "no vertex group 'light'" in err
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (1,), (2,), (0, 2)], ids=str)
+def test_warnings_name_the_object_that_they_are_about(package, run, tmp_path, monkeypatch, chosen):
+    module = package("pipelines.shapes.partition")
+    for k in range(3):
+        scenes.bump(3, 2, name="ABC"[k], offset=2.0 * k)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    true, asked = module.partition_surface, []
+
+    def partition_surface(*given):
+        found = yield from true(*given)
+        asked.append(len(asked))
+        told = (f"number {asked[-1]} is torn",) if asked[-1] in chosen else ()
+        return replace(found, warnings=told)
+
+    monkeypatch.setattr(module, "partition_surface", partition_surface)
+    words = ["partition", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--cells", 2, "--relax", 0]
+    status, out, err = run(*words, "--write", "attribute", "--report", tmp_path / "r.json")
+    assert status == 0, err
+    told = [f"{'ABC'[k]}: number {k} is torn" for k in chosen]
+    assert [line.partition("warning: ")[2] for line in err.splitlines()] == told
+    assert json.loads((tmp_path / "r.json").read_text())["warnings"] == told
+    assert [line.partition(":")[0] for line in out.splitlines()] == list("ABC")

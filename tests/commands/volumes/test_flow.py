@@ -71,3 +71,22 @@ def test_the_ball_that_keeps_a_flow_in_is_around_all_bodies_wherever_they_are(pa
     np.testing.assert_allclose(middle, [41.5, -70, 5])
     distance = np.linalg.norm(np.concatenate([body.positions for body in bodies]) - middle, axis=1)
     assert radius == pytest.approx(1.1 * distance.max())
+
+
+@pytest.mark.parametrize("option", ["", "feet", "tip"])
+@pytest.mark.parametrize("in_file", [(), ("feet",), ("tip",)], ids=str)
+def test_what_stays_is_that_of_the_option_before_that_of_the_file(package, monkeypatch, option, in_file):
+    command, bodies = package("commands.volumes.flow"), package("blender.volumes.bodies")
+    V, F = icosphere(1)
+    obj = scenes.add(V, F, "Ball")
+    for name in ("feet", "tip"):
+        obj.vertex_groups.new(name=name)
+    kept = []
+    monkeypatch.setattr(bodies, "read_body", lambda obj, keep="": kept.append(keep))
+    monkeypatch.setattr(package("pipelines.volumes.handle_file"), "handles_of", lambda *_: kept[0])
+    monkeypatch.setattr(package("pipelines.volumes.flow"), "FlowJob", lambda _, handles, *more: handles)
+    monkeypatch.setattr(package("pipelines.volumes.flow"), "flow_bodies", lambda handles: handles)
+    monkeypatch.setattr(command, "drain_shown", lambda found: found)
+    options = SimpleNamespace(keep=option, sharpness=None, radius=0.3, path="straight", samples=2, inside="", frames=1)
+    expected = option or (in_file[0] if in_file else "")
+    assert command._flow(options, SimpleNamespace(keep=in_file), [obj]) == expected and kept == [expected]
