@@ -395,7 +395,7 @@ def test_images_of_gltf_that_stay_behind_are_named(package, run, tmp_path):
 def test_objects_stand_where_they_stood_also_next_to_the_axes(package, tmp_path, suffix, turn):
     scenes.open_empty()
     obj = scenes.bump(2, 2, name="A")
-    obj.rotation_euler, obj.location = (0.0, turn, 0.0), (0.003, -2.0, 0.5 + turn)
+    obj.rotation_euler, obj.location = (0.0, turn, 0.0), (0.003, -2.0, 1.0 + turn)
     bpy.context.view_layer.update()
     points = np.array([obj.matrix_world @ v.co for v in obj.data.vertices])
     path = tmp_path / f"made{suffix}"
