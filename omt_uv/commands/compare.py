@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, write_picture
 from .options import add_input
-from .selection import read_file
+from .selection import of_file, read_file
 
 # What a plot draws, each a curve, and how the page calls it.
 PLOTTED = {
@@ -100,7 +100,7 @@ def _strain_of_file(options: argparse.Namespace, path: Path) -> list:
     """The strain by region of the one mesh of a file."""
     from ..blender.shapes.strain import strain_rows
 
-    pairs = read_file(argparse.Namespace(**{**vars(options), "input": path}))
+    pairs = read_file(of_file(options, path))
     if len(pairs) > 1:
         raise CommandError(f"{path}: it has several meshes. Name one by --object.")
     obj, reading = pairs[0]
@@ -121,9 +121,8 @@ def _mesh(options: argparse.Namespace, path: Path):
 
     from ..blender.measuring.distances import placed_mesh
 
-    values = {**vars(options), "input": path}
     positions, triangles, count = [], [], 0
-    for obj, reading in read_file(argparse.Namespace(**values)):
+    for obj, reading in read_file(of_file(options, path)):
         mine, faces = placed_mesh(obj, reading)
         positions.append(mine)
         triangles.append(faces + count)

@@ -6,9 +6,13 @@ import argparse
 import csv
 import io
 import json
+from pathlib import Path
+
+import bpy
 
 import meshes
 import pytest
+import scenes
 
 
 @pytest.fixture
@@ -56,6 +60,29 @@ def test_all_objects_of_a_file_are_compared_together(package, monkeypatch, count
         parts.append((V + [3.0 * k, 0, 0], F))
     monkeypatch.setattr(command, "read_file", lambda options: [(None, part) for part in parts])
     monkeypatch.setattr(package("blender.measuring.distances"), "placed_mesh", lambda obj, part: part)
-    positions, triangles = command._mesh(argparse.Namespace(), "in.blend")
+    options = argparse.Namespace(input=Path("in.blend"), object=[])
+    positions, triangles = command._mesh(options, options.input)
     expected = [V[triangle].tolist() for V, F in parts for triangle in F]
     assert positions[triangles].tolist() == expected and len(positions) == sum(len(V) for V, _ in parts)
+
+
+@pytest.mark.parametrize("more", [[], ["--beltrami"]], ids=str)
+def test_objects_that_are_named_are_those_of_the_first_file(run, tmp_path, monkeypatch, package, more):
+    """As everywhere where several files are read: of the others all are meant."""
+    monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 500)
+    for file, names in (("in", "AZ"), ("other", "B")):
+        scenes.open_empty()
+        for k, name in enumerate(names):
+            obj = scenes.bump(3, 2, name=name, offset=5.0 * k)
+            scenes.set_uv(obj, 0.2 * scenes.seen_from_above(obj))
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{file}.blend"))
+    words = ["compare", tmp_path / "in.blend", tmp_path / "other.blend", "--json", *more]
+    status, out, err = run(*words, "--object", "A")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    if more:
+        assert set(found[str(tmp_path / "other.blend")].values()) == {0.0}
+    else:
+        assert [row["hausdorff"] for row in found] == [pytest.approx(0, abs=1e-6)]
+    status, _, err = run(*words, "--object", "B")
+    assert status == 1 and "in.blend: there is no mesh 'B'. It has A, Z." in err
