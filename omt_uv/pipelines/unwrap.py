@@ -16,7 +16,7 @@ from ..solver.canonical.markers import MapMarkers
 from ..solver.errors import DISSOLVE, MERGING, MeshError, plural
 from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
-from ..solver.mesh.geometry import signed_areas, turned_by
+from ..solver.mesh.geometry import face_areas, signed_areas, turned_by
 from ..solver.mesh.repair import FlatTriangles, flat_triangles, joined_vertices
 from ..solver.mesh.surface import side_ends, turned_surface, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
@@ -66,10 +66,11 @@ def lay_out(
     warnings = [(index, _lie_flat(len(one.polygons))) for index, one in enumerate(flat) if len(one.polygons)]
     warnings += [(index, warning) for index, (_, warning) in enumerate(prepared) if warning]
     share = PACKING_FROM / len(jobs)
-    cuts = yield from _cut_together(jobs, options)
+    options_of = _in_one_texture(jobs, options)
+    cuts = yield from _cut_together(jobs, options_of)
     for index, job in enumerate(jobs):
         try:
-            unwrapping = _unwrapped(job, _standing(options, job), cuts.get(index))
+            unwrapping = _unwrapped(job, options_of[index], cuts.get(index))
             found = yield from part_of(unwrapping, index * share, share)
             maps.append(_seams_as_given(found, given[index], job))
         except MeshError as error:
@@ -142,7 +143,7 @@ def _beside(job: UnwrapJob) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(points.reshape(-1, 2), np.arange(points.shape[0] * 3).reshape(-1, 3))] if len(points) else []
 
 
-def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[dict[int, CutCharts]]:
+def _cut_together(jobs: Sequence[UnwrapJob], options: Sequence[UnwrapOptions]) -> Steps[dict[int, CutCharts]]:
     """Charts of several small surfaces, by the numbers of these, those mapped that can be solved together."""
     small = [k for k, job in enumerate(jobs) if len(job.surface.triangles) <= SMALL and job.subdivision is None]
     small = [k for k in small if jobs[k].markers is None]
@@ -154,7 +155,7 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
         job = jobs[k]
         try:
             given: dict[str, Any] = {
-                "options": _standing(options, job),
+                "options": options[k],
                 "pins": job.pins,
                 "target": job.target,
                 "avoid": job.avoid,
@@ -162,8 +163,23 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
             cuts.append((yield from part_of(cut_charts(job.surface, job.faces, **given), 0.0, 0.0)))
         except MeshError as error:
             raise Refusal(k, error) from error
-    cuts = yield from part_of(map_small_charts(cuts, options), 0.0, 0.0)
+    cuts = yield from part_of(map_small_charts(cuts, options[0]), 0.0, 0.0)
     return dict(zip(small, cuts, strict=True))
+
+
+def _in_one_texture(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> list[UnwrapOptions]:
+    """The options of each of several surfaces, which know how much lies beside it."""
+    if len(jobs) == 1:
+        return [_standing(options, jobs[0])]
+    areas = np.zeros(len(jobs))
+    for k, job in enumerate(jobs):
+        surface, chosen = job.surface, slice(None) if job.faces is None else job.faces[job.surface.triangle_face]
+        # What is not finite is refused in its turn.
+        with np.errstate(all="ignore"):
+            areas[k] = face_areas(surface.positions, surface.corner_vertex[surface.triangles[chosen]]).sum()
+    areas[~np.isfinite(areas)] = 0.0
+    beside = areas.sum() - areas
+    return [_standing(replace(options, beside=float(b)), job) for b, job in zip(beside, jobs, strict=True)]
 
 
 def _standing(options: UnwrapOptions, job: UnwrapJob) -> UnwrapOptions:

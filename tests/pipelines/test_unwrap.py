@@ -169,6 +169,23 @@ def test_parts_between_existing_seams_are_not_joined():
     assert len(found.maps[0].charts) == len(F)
 
 
+def test_what_is_long_by_itself_stays_whole_beside_much_else():
+    """A hose alone is cut across, so that it fills more of a texture; not so beside a wall."""
+    k, sectors, rings = np.arange(12), 12, 120
+    V = np.concatenate(
+        [np.stack([np.cos(k * np.pi / 6), np.sin(k * np.pi / 6), 0 * k + z], axis=1) for z in range(rings)]
+    )
+    hose = meshes.polygon_surface(
+        V, [[r * 12 + k, r * 12 + (k + 1) % 12, r * 12 + 12 + (k + 1) % 12, r * 12 + 12 + k]
+            for r in range(rings - 1) for k in range(sectors)])  # fmt: skip
+    wall = triangle_surface(*meshes.grid(8, 8, 120.0, 120.0))
+    settings = Settings(max_shear=1.35)
+    alone = drain(lay_out([UnwrapJob(hose)], settings))
+    beside = drain(lay_out([UnwrapJob(hose), UnwrapJob(wall)], settings))
+    assert len(alone.maps[0].charts) > 1 and len(beside.maps[0].charts) == 1
+    assert len(beside.maps[1].charts) == 1
+
+
 def test_what_a_file_had_to_split_at_borders_of_its_uvs_is_mapped_as_if_it_were_whole():
     """Not so a slit of somebody's mesh; and there is nothing to be told of it."""
     V, F = meshes.icosphere(2)

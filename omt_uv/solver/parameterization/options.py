@@ -28,7 +28,7 @@ LENIENCE = 1.4
 @dataclass(frozen=True)
 class ShearBound:
     """A bound of the mean shear s1/s2 of charts, > 1; further: of those whose seams were marked by hand, too;
-    preferences: where the cuts for it had better be.
+    preferences: where the cuts for it had better be; beside: the area of what goes into the texture besides.
 
     With balance the areas are not exact: the shear then stands for that of the map with exact areas that has the same
     symmetric Dirichlet energy (r + 1/r) (q + 1/q), from the area ratio r and the shear q.
@@ -37,6 +37,7 @@ class ShearBound:
     bound: float
     further: bool = False
     preferences: SeamPreferences = field(default_factory=SeamPreferences)
+    beside: float = 0.0
 
     def __post_init__(self):
         if not self.bound > 1:
@@ -119,6 +120,7 @@ class UnwrapOptions(MapOptions):
         > 1; 0 for none that no disk needs. Parts whose seams were marked by hand are left as they are
     cut_further : parts whose seams were marked by hand get more of them, too
     preferences : where these seams had better be
+    beside : the area of other surfaces in the same texture: what is long by itself is short beside much else
 
     Raises
     ------
@@ -130,6 +132,7 @@ class UnwrapOptions(MapOptions):
     max_shear: float = 0.0
     cut_further: bool = False
     preferences: SeamPreferences = field(default_factory=SeamPreferences)
+    beside: float = 0.0
 
     def __post_init__(self):
         super().__post_init__()
@@ -141,7 +144,7 @@ class UnwrapOptions(MapOptions):
         """The bound of the shear that seams are searched for; None where none are."""
         if not self.max_shear or self.seams != "auto" or self.boundary != "free" or self.kind != "authalic":
             return None
-        return ShearBound(self.max_shear, self.cut_further, self.preferences)
+        return ShearBound(self.max_shear, self.cut_further, self.preferences, self.beside)
 
 
 def _check(name: str, value: str, allowed) -> None:

@@ -122,7 +122,7 @@ def in_pieces(
     cable, and bodies with limbs. Charts that were not cut at all, and those with marked seams, stay whole."""
     surface = search.surface
     chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
-    whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
+    whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum()) + search.shear.beside
     cuts = prepared.found_cuts
     new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts.edges]
     for chart, chart_map in zip(prepared.charts, maps, strict=True):
@@ -141,7 +141,7 @@ def in_pieces(
 def _pieces(
     search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float, map_charts
 ) -> Steps[tuple[tuple[list[Chart], list[ChartMap]], np.ndarray]]:
-    """A chart of a surface of area `whole` and its map cut in pieces, and the edges (k,2) in between; whole where it is
+    """A chart of surfaces of area `whole` and its map cut in pieces, and the edges (k,2) in between; whole where it is
     neither long nor sprawls, or the pieces are no disks."""
     from ..seams.limbs import may_come_apart, pieces_of_chart
 

@@ -162,7 +162,7 @@ def _with_image(
 def _is_sound(search: ShearSearch, last: Round, new: Round) -> bool:
     """Whether a new round has fewer charts than the last, and those that are new keep the bound and stay whole."""
     axes = search.shear.preferences.axes
-    up, whole = None if axes is None else axes.up, float(last.area.sum())
+    up, whole = None if axes is None else axes.up, float(last.area.sum()) + search.shear.beside
     before = {np.sort(chart.faces).tobytes() for chart in last.charts}
     changed = [k for k, chart in enumerate(new.charts) if np.sort(chart.faces).tobytes() not in before]
     return len(new.charts) < len(last.charts) and all(

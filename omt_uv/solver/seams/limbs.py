@@ -82,7 +82,7 @@ def pieces_of_chart(
     """The piece (m,) of every triangle of a chart with map uv (n,2) that `may_come_apart`, and the edges (k,2) of the
     surface in between; one piece where others would fill a texture little better.
 
-    whole : the area of the surface; cost, images : see `parting.parted`; up (3,) : see `sprawls`
+    whole : the area of all that goes into the texture; cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
     if len(chart.patches):
         graph = PolygonGraph.of(chart)
