@@ -59,12 +59,9 @@ def lay_out(
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
     as_they_stand, jobs = jobs, [_set_up(job) for job in jobs]
-    whole, (jobs, flat) = jobs, _without_flat(jobs)
-    given, prepare = jobs, {"charts": _with_charts, "auto": _joined}.get(settings.seams, _as_it_is)
-    prepared = [prepare(index, job) for index, job in enumerate(jobs)]
-    jobs = [job for job, _ in prepared]
-    warnings = [(index, _lie_flat(len(one.polygons))) for index, one in enumerate(flat) if len(one.polygons)]
-    warnings += [(index, warning) for index, (_, warning) in enumerate(prepared) if warning]
+    whole, (jobs, flat, warnings) = jobs, _without_flat(jobs)
+    given, (jobs, more) = jobs, _prepared(jobs, settings.seams)
+    warnings += more
     share = PACKING_FROM / len(jobs)
     options_of = _in_one_texture(jobs, options)
     cuts = yield from _cut_together(jobs, options_of)
@@ -100,7 +97,7 @@ def lay_out(
     rounded = iter(in_single_precision(moved))
     placed = [i if stays else next(rounded) for i, stays in zip(mapped, pinned, strict=True)]
     carried = [one.carried(*laid) for one, *laid in zip(flat, *corner_uvs(len(maps), placed), strict=True)]
-    corners, uv = [corner for corner, _ in carried], [points for _, points in carried]
+    corners, uv = (list(x) for x in zip(*carried, strict=True))
     as_given = [_set_back(one, job.axes) for one, job in zip(maps, as_they_stand, strict=True)]
     return Layout(corners=corners, uv=uv, maps=as_given, packing=packed, warnings=warnings)
 
@@ -216,24 +213,30 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     return (yield from part_of(rest, share, 1 - share))
 
 
-def _without_flat(jobs: Sequence[UnwrapJob]) -> tuple[list[UnwrapJob], list[FlatTriangles]]:
-    """The jobs without triangles that would tear their maps and lie on others anyway, and these triangles of each."""
-    rest, flat = [], []
-    for job in jobs:
+def _without_flat(
+    jobs: Sequence[UnwrapJob],
+) -> tuple[list[UnwrapJob], list[FlatTriangles], list[tuple[int, str]]]:
+    """The jobs without triangles that would tear their maps and lie on others anyway, these triangles of each, and
+    warnings."""
+    rest, flat, warnings = [], [], []
+    for index, job in enumerate(jobs):
         faces = np.ones(len(job.surface.face_start) - 1, dtype=bool) if job.faces is None else job.faces
         found = flat_triangles(job.surface, faces)
         flat.append(found)
-        left = faces.copy()
-        left[found.polygons] = False
-        rest.append(replace(job, faces=left) if len(found.polygons) else job)
-    return rest, flat
+        if count := len(found.polygons):
+            who = plural(count, "A triangle", "{} triangles")
+            warnings.append((index, f"{who} with two corners at one place, left out of the map; {DISSOLVE}"))
+            faces = faces.copy()
+            faces[found.polygons] = False
+        rest.append(replace(job, faces=faces) if count else job)
+    return rest, flat, warnings
 
 
-def _lie_flat(count: int) -> str:
-    """A warning that so many triangles have no island of their own."""
-    return (
-        f"{plural(count, 'A triangle', '{} triangles')} with two corners at one place, left out of the map; {DISSOLVE}"
-    )
+def _prepared(jobs: Sequence[UnwrapJob], seams: str) -> tuple[list[UnwrapJob], list[tuple[int, str]]]:
+    """The jobs with the seams of charts, or with parts joined, and warnings."""
+    prepare = {"charts": _with_charts, "auto": _joined}.get(seams, _as_it_is)
+    prepared = [prepare(index, job) for index, job in enumerate(jobs)]
+    return [job for job, _ in prepared], [(index, text) for index, (_, text) in enumerate(prepared) if text]
 
 
 def _with_charts(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:

@@ -8,6 +8,7 @@ import pytest
 from broken_meshes import arrays, broken_mesh, broken_model, check_error
 
 from omt_uv.solver.errors import MeshError
+from omt_uv.solver.mesh.repair import flat_triangles
 from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -104,6 +105,10 @@ def test_every_layout_is_whole_or_refused_by_name(seams):
         except Refusal as refusal:
             check_error(refusal.error, surface)
         else:
-            check_result(layout.maps[0], surface, faces)
+            chosen = np.ones(len(surface.face_start) - 1, bool) if faces is None else faces.copy()
+            assert np.array_equal(layout.corners[0], np.flatnonzero(np.repeat(chosen, np.diff(surface.face_start))))
+            # Those that lie on others are in no map.
+            chosen[flat_triangles(surface, chosen).polygons] = False
+            check_result(layout.maps[0], surface, chosen)
             assert np.isfinite(layout.uv[0]).all()
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, arrays(surface), strict=True)), seed

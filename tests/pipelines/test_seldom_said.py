@@ -111,7 +111,7 @@ def test_shares_of_the_texture_are_those_of_areas_times_density(density):
 def test_the_density_of_several_regions_tells_which_way_to_go():
     """From 0, where there is least of the density, to 1, where there is most, over all surfaces together."""
     surfaces = [SimpleNamespace(surface=reading(*meshes.grid(2, k)).surface, faces=None, pins=None, subdivision=None,
-                                axes="axes") for k in (1, 2)]  # fmt: skip
+                                was_split=False, axes="axes") for k in (1, 2)]  # fmt: skip
     counts = [len(s.surface.triangles) for s in surfaces]
     rows = [np.arange(0, counts[0], 2), np.arange(counts[1])]
     parts = [(r, np.ones(len(r)), None) for r in rows]

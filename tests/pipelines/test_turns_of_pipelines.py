@@ -179,7 +179,12 @@ def test_meshes_are_unwrapped_again_for_what_is_missed_of_the_shares(exact, bala
 def test_targets_of_surfaces_are_their_parts_of_what_is_asked_of_all(flat):
     surfaces = [
         SimpleNamespace(
-            surface=SimpleNamespace(triangles=np.zeros((n, 3), int)), faces=k, pins=None, subdivision=None, axes=None
+            surface=SimpleNamespace(triangles=np.zeros((n, 3), int)),
+            faces=k,
+            pins=None,
+            subdivision=None,
+            axes=None,
+            was_split=False,
         )
         for k, n in enumerate((3, 2))
     ]

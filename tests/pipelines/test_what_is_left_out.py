@@ -93,7 +93,12 @@ def test_surfaces_without_a_pin_are_unwrapped_as_if_nobody_had_pinned_anything(p
     asked = []
     pins = None if pinned is None else SimpleNamespace(pinned=np.array(pinned))
     region = SimpleNamespace(
-        surface=SimpleNamespace(triangles=np.zeros((4, 3), int)), faces="faces", pins=pins, subdivision=None, axes=None
+        surface=SimpleNamespace(triangles=np.zeros((4, 3), int)),
+        faces="faces",
+        pins=pins,
+        subdivision=None,
+        axes=None,
+        was_split=False,
     )
     rows, area, weights = np.array([1, 3]), np.array([1.0, 3.0]), np.array([0.0, 1.0])
     monkeypatch.setattr(magnified, "region_triangles", lambda region: (rows, area, weights))
