@@ -18,6 +18,7 @@ from ..pipelines.reading import Reading
 from ..solver.analysis.facing import SceneAxes
 from ..solver.errors import MeshError, NonFiniteError
 from ..solver.mesh.geometry import places
+from ..solver.mesh.repair import flat_triangles, joined_vertices
 from ..solver.mesh.surface import Surface, duplicate_faces, with_joined_vertices
 from ..solver.mesh.topology import first_of
 from .subdivision import modifier_of
@@ -146,7 +147,7 @@ def weld_split_vertices(reading: Reading) -> Reading:
     """Join vertices that a file format had to split: equal position and, where there are UVs, equal UV.
 
     The mesh stays as it is; the corners of the surface all refer to the first of the equal vertices. Faces that would
-    be double then, as both sides of a leaf, keep their own.
+    be double then, as both sides of a leaf, keep their own, but for those of sides on which they go on in one another.
     """
     surface = reading.surface
     key = surface.positions
@@ -160,6 +161,12 @@ def weld_split_vertices(reading: Reading) -> Reading:
     double[duplicate_faces(with_joined_vertices(surface, same), ~double)[:, 0]] = True
     own = same[surface.corner_vertex[np.repeat(double, size)]]
     same = np.where(np.isin(same, own), np.arange(len(same)), same)
+    apart = replace(with_joined_vertices(surface, same), positions=key)
+    if double.any():
+        # A triangle without area would join both sides.
+        whole = np.ones(len(size), dtype=bool)
+        whole[flat_triangles(apart, whole).polygons] = False
+        same = joined_vertices(apart, whole, was_split=True)[same]
     return replace(reading, surface=with_joined_vertices(surface, same), was_split=True)
 
 

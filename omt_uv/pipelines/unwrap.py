@@ -20,6 +20,7 @@ from ..solver.mesh.geometry import face_areas, signed_areas, turned_by
 from ..solver.mesh.repair import FlatTriangles, flat_triangles, joined_vertices
 from ..solver.mesh.surface import side_ends, turned_surface, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
+from ..solver.parameterization.chart_indices import CornerPins
 from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.small_charts import SMALL
 from ..solver.parameterization.unwrap import CutCharts, SurfaceMap, cut_charts, map_small_charts, unwrap
@@ -228,8 +229,19 @@ def _without_flat(
             warnings.append((index, f"{who} with two corners at one place, left out of the map; {DISSOLVE}"))
             faces = faces.copy()
             faces[found.polygons] = False
-        rest.append(replace(job, faces=faces) if count else job)
+        rest.append(replace(job, faces=faces, pins=_pins_of_hosts(job.pins, found)) if count else job)
     return rest, flat, warnings
+
+
+def _pins_of_hosts(pins: CornerPins | None, flat: FlatTriangles) -> CornerPins | None:
+    """Pins of corners that get the UVs of others hold these, where they are not pinned themselves."""
+    if pins is None:
+        return None
+    held = pins.pinned[flat.corners] & ~pins.pinned[flat.hosts]
+    pinned, uv = pins.pinned.copy(), pins.uv.copy()
+    pinned[flat.hosts[held]] = True
+    uv[flat.hosts[held]] = uv[flat.corners[held]]
+    return CornerPins(pinned, uv)
 
 
 def _prepared(jobs: Sequence[UnwrapJob], seams: str) -> tuple[list[UnwrapJob], list[tuple[int, str]]]:

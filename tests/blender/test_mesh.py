@@ -7,6 +7,7 @@ from dataclasses import fields
 
 import bpy
 
+import meshes
 import numpy as np
 import pytest
 import scenes
@@ -82,6 +83,18 @@ def test_split_vertices_become_one_and_the_faces_stay(blender_mesh):
     surface = blender_mesh.weld_split_vertices(blender_mesh.read(obj)).surface
     assert len(np.unique(surface.corner_vertex)) == 4
     assert (surface.positions[surface.corner_vertex] == blender_mesh.read(obj).surface.positions).all()
+
+
+@pytest.mark.parametrize("flat", [0, 1, 2])
+def test_both_sides_of_what_was_split_up_are_whole_and_apart(blender_mesh, flat):
+    """Two triangles without area on the same vertices are no sides of a leaf, and none joins those of one."""
+    V, F = meshes.grid(3, 3)
+    a, b = F[4, :2]
+    both = np.vstack([F, F[:, ::-1], *[[[a, b, a]], [[b, a, a]]][:flat]])
+    obj = scenes.add(V[both].reshape(-1, 3).tolist(), np.arange(both.size).reshape(-1, 3).tolist())
+    corners = blender_mesh.weld_split_vertices(blender_mesh.read(obj)).surface.corner_vertex.reshape(-1, 3)
+    up, down = np.unique(corners[: len(F)]), np.unique(corners[len(F) : 2 * len(F)])
+    assert len(up) == len(down) == len(V) and not np.isin(up, down).any()
 
 
 def test_a_new_layer_is_a_copy_and_becomes_the_active_one(blender_mesh):

@@ -18,6 +18,7 @@ from omt_uv.solver.analysis.facing import Y_UP, SceneAxes
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.parameterization.unwrap import predicted_cuts
 from omt_uv.solver.progress import drain
 
@@ -230,6 +231,32 @@ def test_triangles_without_area_that_would_tear_the_map_lie_on_their_neighbours(
         assert signed_areas(found.uv[0][[first, first + 1, first + 2]], np.arange(3)[None])[0] == 0
     text = "3 triangles with two corners at one place, left out of the map; dissolve faces without area"
     assert found.warnings == [(0, text)]
+
+
+def test_a_strip_stays_one_where_a_triangle_of_it_has_no_area():
+    V, F = meshes.grid(4, 1)
+    V[1] = V[2]
+    for seams in ("auto", "existing"):
+        found = drain(lay_out([UnwrapJob(triangle_surface(V, F))], Settings(seams=seams)))
+        assert len(found.maps[0].charts) == 1
+
+
+def test_pins_of_a_triangle_that_lies_on_its_neighbours_hold_these():
+    V, F = meshes.bumpy(4, 4)
+    a, b = F[5, :2]
+    surface = triangle_surface(V, np.vstack([F, [[a, b, a]]]))
+    uv = V[surface.corner_vertex, :2].astype(np.float32)
+    pinned = np.arange(len(uv)) >= 3 * len(F)
+    found = drain(lay_out([UnwrapJob(surface, pins=CornerPins(pinned, uv))], Settings(quality="draft")))
+    np.testing.assert_allclose(found.uv[0][-3:], uv[-3:], atol=1e-6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_square_of_what_has_no_triangle_inside_needs_no_division_by_nothing():
+    V, F = meshes.cube()
+    V = V + np.random.default_rng(0).normal(size=V.shape) * 0.01
+    found = drain(lay_out([UnwrapJob(triangle_surface(V, F))], Settings(boundary="square", quality="draft")))
+    assert len(found.maps[0].charts) == 1
 
 
 def test_what_is_nothing_but_triangles_without_area_is_no_reason_to_search():

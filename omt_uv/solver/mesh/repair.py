@@ -237,13 +237,17 @@ def flat_triangles(surface: Surface, faces: np.ndarray) -> FlatTriangles:
     none = np.zeros(0, np.int64)
     if not len(short):
         return FlatTriangles(none, none, none)
-    chosen = np.flatnonzero(faces[owner])
+    chosen, place = np.flatnonzero(faces[owner]), places(surface.positions)[vertex]
     open_ = chosen[only_once(pair_keys(vertex[chosen], vertex[after[chosen]]))]
-    twice = short[vertex[short] == vertex[after[short]]]
     torn = np.zeros(len(faces), dtype=bool)
-    torn[owner[open_]] = torn[owner[twice]] = True
+    in_point = np.bincount(owner[short], minlength=len(faces)) == 3
+    torn[owner[open_[(place[open_] != place[after[open_]]) | in_point[owner[open_]]]]] = True
+    torn[owner[short[vertex[short] == vertex[after[short]]]]] = True
+    # Where only the short side is open, a triangle joins its neighbours, unless what lies there goes.
+    there = short[torn[owner[short]]]
+    ends = open_[np.isin(place[open_], place[there])]
+    torn[owner[ends[place[ends] == place[after[ends]]]]] = True
     found &= torn
-    place = places(surface.positions)[vertex]
     kept, mine = np.flatnonzero((faces & ~found)[owner]), np.flatnonzero(found[owner]).reshape(-1, 3)
     hosts = _hosts(place, after, kept, mine)
     mine, hosts = mine[(hosts >= 0).all(axis=1)], hosts[(hosts >= 0).all(axis=1)]

@@ -135,12 +135,16 @@ def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> 
 
 def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
     """Polygons on the same set of vertices as another: rows (k,3) of polygon, its number among its likes, and the first
-    of these."""
+    of these. None with a vertex used twice."""
     size = np.diff(surface.face_start)
     rows = [np.zeros((0, 3), np.int64)]
     for s in np.unique(size[faces]):
         index = np.flatnonzero(faces & (size == s))
         vertices = np.sort(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)], axis=1)
+        proper = (vertices[:, 1:] != vertices[:, :-1]).all(axis=1)
+        index, vertices = index[proper], vertices[proper]
+        if not len(index):
+            continue
         inverse = row_labels(vertices)
         count = np.bincount(inverse)
         order = np.argsort(inverse, kind="stable")

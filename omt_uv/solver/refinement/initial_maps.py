@@ -195,7 +195,8 @@ def _attempts(mesh, several, half, reasons) -> list[tuple[InitialMap | FoldedUVE
     inside = ~np.isin(triangles, loop).all(axis=1)
     try:
         embedded = tutte(uv, triangles, loop, np.concatenate(places, axis=1))
-        values = [map_energy(embedded[:, 2 * k : 2 * k + 2], vertices, triangles[inside]) for k in range(len(several))]
+        starts = [embedded[:, 2 * k : 2 * k + 2] for k in range(len(several))] if inside.any() else []
+        values = [map_energy(start, vertices, triangles[inside]) for start in starts]
     except PrecisionError:
         values = []
     best = [k for k in np.argsort(values)[:BEST] if np.isfinite(values[k])]

@@ -522,6 +522,20 @@ def test_only_triangles_that_would_tear_a_map_and_lie_on_a_polygon_are_found():
     assert len(flat_of(triangle_surface(nowhere, np.vstack([F, [[len(V)] * 3]]))).polygons) == 0
 
 
+def test_a_flat_triangle_that_joins_its_neighbours_stays():
+    """Left out, it would part a strip: its ends at one place are two vertices."""
+    V, F = meshes.grid(4, 1)
+    V[1] = V[2]
+    surface = triangle_surface(V, F)
+    assert len(flat_of(surface).polygons) == 0
+    # But for where another one of these goes that lies there.
+    a, b = np.flatnonzero((V[1] == V).all(axis=1))
+    apex = np.setdiff1d(F[(a == F).any(axis=1) & (b == F).any(axis=1)][0], [a, b])[0]
+    torn = triangle_surface(V, np.vstack([F, [[a, a, apex]]]))
+    flat = np.flatnonzero((a == F).any(axis=1) & (b == F).any(axis=1))
+    assert flat_of(torn).polygons.tolist() == [*flat, len(F)]
+
+
 def test_uvs_are_carried_from_the_corners_that_have_some():
     flat = repair.FlatTriangles(np.array([1]), np.array([3, 4, 5]), np.array([7, 2, 9]))
     corners, uv = flat.carried(np.array([0, 2, 7]), np.array([[0.0, 0], [0.2, 1], [0.7, 1]]))

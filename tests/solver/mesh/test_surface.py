@@ -39,6 +39,13 @@ def test_duplicates_are_numbered_among_their_likes():
     assert set(rows[:, 2]) == {3, 5}
 
 
+def test_polygons_with_a_vertex_used_twice_are_nobody_s_duplicates():
+    V, F = meshes.grid(2, 2)
+    a, b = F[0, :2]
+    surface = triangle_surface(V, np.vstack([F, [[a, b, a], [b, a, a]]]))
+    assert len(duplicate_faces(surface, np.ones(len(F) + 2, bool))) == 0
+
+
 def test_seams_know_no_direction():
     surface = triangle_surface(*meshes.grid(), seams=[(1, 0), (5, 6)])
     keys = pair_keys(np.array([0, 6, 0]), np.array([1, 5, 2]))
