@@ -170,6 +170,26 @@ def test_parts_between_existing_seams_are_not_joined():
     assert len(found.maps[0].charts) == len(F)
 
 
+@pytest.mark.parametrize("noise", [0.0, 3e-8])
+def test_needles_on_the_edges_of_a_box_change_nothing_of_its_net(noise):
+    """Points on edges that belong to one side alone, with a triangle without area in between: exporters leave some."""
+    V, P = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)]), []
+    P = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
+         [1, 5, 7], [1, 7, 3]]  # fmt: skip
+    box = drain(lay_out([UnwrapJob(triangle_surface(V, np.array(P)))], Settings(max_shear=1.35)))
+    rng = np.random.default_rng(0)
+    W, F = V.tolist(), [list(t) for t in P]
+    for number, (a, b, c) in ((0, (0, 1, 3)), (2, (4, 6, 7)), (6, (2, 3, 7)), (10, (1, 5, 7))):
+        # The triangle has a point on its first side, and a needle goes in between.
+        m = len(W)
+        W.append((0.6 * np.array(V[a]) + 0.4 * np.array(V[b]) + noise * rng.normal(size=3)).tolist())
+        F[number] = [a, m, c]
+        F += [[m, b, c], [a, b, m]]
+    found = drain(lay_out([UnwrapJob(triangle_surface(np.array(W), np.array(F)))], Settings(max_shear=1.35)))
+    assert len(found.maps[0].charts) == len(box.maps[0].charts) == 1
+    assert max(m.angle_mean for m in found.maps[0].maps) < 1.01
+
+
 def test_what_is_long_by_itself_stays_whole_beside_much_else():
     """A hose alone is cut across, so that it fills more of a texture; not so beside a wall."""
     k, sectors, rings = np.arange(12), 12, 120

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.geometry import cross3, dot3, face_areas, face_normals, halfedge_lengths, lengths
+from ..mesh.repair import NEEDLE
 from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
@@ -26,13 +27,18 @@ def sharp_edges(positions: np.ndarray, triangles: np.ndarray, angle: float) -> n
 def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:
     """Angle (e,) between the normals of the two faces (m,3) at pairs of halfedges (e,2), radians.
 
-    Negative where the surface is hollow, 0 beside faces without area.
+    Negative where the surface is hollow. Faces without area lie in the plane of a neighbour, of that along their
+    longest side; 0 where there is none that has one.
     """
     p = np.take(positions, triangles, axis=0)
     normal = cross3(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     size = lengths(normal)
     normal /= np.where(size > 0, size, 1)[:, None]
     t, s = pair.T // 3
+    longest = np.maximum(lengths(p[:, 1] - p[:, 0]), np.maximum(lengths(p[:, 2] - p[:, 1]), lengths(p[:, 0] - p[:, 2])))
+    if (needles := size <= 2 * NEEDLE * longest**2).any():
+        long = lengths(positions[triangles[t, pair[:, 0] % 3]] - positions[triangles[t, (pair[:, 0] + 1) % 3]])
+        normal, size = _of_neighbours(normal, needles, np.stack([t, s]), long)
     one, other = np.take(normal, t, axis=0), np.take(normal, s, axis=0)
     cosine = np.clip(dot3(one, other), -1, 1)
     # The far corner of the one face lies above the other where the surface is hollow.
@@ -40,6 +46,27 @@ def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) 
     rise = dot3(one, far)
     depth = np.where((size[t] > 0) & (size[s] > 0), np.arccos(cosine), 0.0)
     return np.where(rise > 0, -depth, depth)
+
+
+def _of_neighbours(
+    normal: np.ndarray, needles: np.ndarray, faces: np.ndarray, long: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Normals (m,3) in which `needles` (m,) bool have that of a neighbour, of pairs of faces (2,e) along sides of such
+    lengths (e,), and whether (m,) they have one: what rounding leaves of their own turns any way."""
+    normal, known = np.where(needles[:, None], 0.0, normal), ~needles
+    mine, other = (np.concatenate([faces[k], faces[1 - k]]) for k in range(2))
+    mine, other, long = mine[needles[mine]], other[needles[mine]], np.concatenate([long, long])[needles[mine]]
+    most = np.zeros(len(needles))
+    np.maximum.at(most, mine, long)
+    while True:
+        # One needle after the other has the plane of what lies along its longest side, if that gets any.
+        next_to = ~known[mine] & known[other]
+        along = next_to & (long == most[mine])
+        found = np.flatnonzero(along if along.any() else next_to)
+        if not len(found):
+            return normal, known
+        normal[mine[found]] = normal[other[found]]
+        known[mine[found]] = True
 
 
 def region_borders(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:

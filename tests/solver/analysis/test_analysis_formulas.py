@@ -44,6 +44,32 @@ def dihedral(V, F):
     return found
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+@pytest.mark.parametrize("seed", range(3))
+def test_needles_between_two_faces_fold_as_these_do(noise, seed):
+    """A point on the long side of a face, as where a mesh was mended: of what rounding makes of it nothing is told."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0.3, 2.5)
+    up = np.array([0.0, -np.cos(angle), np.sin(angle)])
+    # Two faces meet at the first side, one whole, the other with a point on it; and with another one beside that.
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.3, 0, 0], [0.6, 0, 0], 0.5 * up + [0.5, 0, 0]])
+    V[3:5] += noise * rng.normal(size=(2, 3))
+    F = np.array([[0, 1, 2], [1, 0, 3], [1, 3, 4], [3, 0, 5], [4, 3, 5], [1, 4, 5]])
+    tail, head = halfedges(F)
+    pair = np.column_stack(pair_up(pair_keys(tail, head)))
+    found = dict(
+        zip(
+            map(frozenset, np.stack([tail, head], axis=1)[pair[:, 0]].tolist()),
+            np.abs(fold_angles(V, F, pair)),
+            strict=True,
+        )
+    )
+    flat = [{0, 1}, {1, 3}, {3, 5}, {4, 5}]
+    assert [found[frozenset(e)] for e in flat] == pytest.approx([0] * 4, abs=1e-6)
+    folds = [found[frozenset(e)] for e in ({0, 3}, {3, 4}, {1, 4})]
+    assert folds == pytest.approx([angle] * 3, abs=1e-6)
+
+
 @pytest.mark.parametrize("mesh", [folded, lambda: meshes.bumpy(5, 4), meshes.cube], ids=["few", "bumpy", "cube"])
 def test_fold_angles_are_those_between_the_normals(mesh):
     V, F = mesh()
