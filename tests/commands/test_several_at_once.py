@@ -53,7 +53,9 @@ def test_a_surface_is_unwrapped_with_its_pins_where_any_corner_is_pinned(package
     surface = reading(*meshes.grid(2, 1)).surface
     marks = np.isin(np.arange(len(surface.corner_vertex)), pinned or [])
     pins = None if pinned is None else SimpleNamespace(pinned=marks)
-    region = SimpleNamespace(surface=surface, faces=None, pins=pins, subdivision="modifier", axes="axes")
+    region = SimpleNamespace(
+        surface=surface, faces=None, pins=pins, subdivision="modifier", axes="axes", was_split=False
+    )
     rows = np.arange(len(surface.triangles))
     parts = [(rows, np.ones(len(rows)), None)]
     (job,) = package("pipelines.regions.several")._jobs([region], parts, np.ones(len(rows)), np.zeros(len(rows)))
