@@ -156,15 +156,12 @@ def weld_split_vertices(reading: Reading) -> Reading:
         uv[surface.corner_vertex] = reading.uv
         key = np.concatenate([key, uv], axis=1)
     same = first_of(places(key))
-    size = np.diff(surface.face_start)
-    double = np.zeros(len(size), dtype=bool)
-    double[duplicate_faces(with_joined_vertices(surface, same), ~double)[:, 0]] = True
-    own = same[surface.corner_vertex[np.repeat(double, size)]]
-    same = np.where(np.isin(same, own), np.arange(len(same)), same)
-    apart = replace(with_joined_vertices(surface, same), positions=key)
-    if double.any():
+    whole = np.ones(len(surface.face_start) - 1, dtype=bool)
+    if len(double := duplicate_faces(with_joined_vertices(surface, same), whole)[:, 0]):
+        of_double = np.repeat(np.isin(np.arange(len(whole)), double), np.diff(surface.face_start))
+        same = np.where(np.isin(same, same[surface.corner_vertex[of_double]]), np.arange(len(same)), same)
+        apart = replace(with_joined_vertices(surface, same), positions=key)
         # A triangle without area would join both sides.
-        whole = np.ones(len(size), dtype=bool)
         whole[flat_triangles(apart, whole).polygons] = False
         same = joined_vertices(apart, whole, was_split=True)[same]
     return replace(reading, surface=with_joined_vertices(surface, same), was_split=True)

@@ -84,6 +84,11 @@ class UnwrapJob:
     markers: MapMarkers | None = None
     was_split: bool = False
 
+    @property
+    def chosen(self) -> np.ndarray:
+        """Which polygons (f,) bool of the surface are unwrapped."""
+        return np.ones(len(self.surface.face_start) - 1, dtype=bool) if self.faces is None else self.faces
+
     @staticmethod
     def of(
         reading: Reading,

@@ -165,6 +165,31 @@ def check_weights(region: Region) -> None:
 # ---- from the mesh ------------------------------------------------------------------------------------------
 
 
+def unwrap_jobs(regions: Sequence[Region], parts, density: np.ndarray, direction: np.ndarray | None) -> list[UnwrapJob]:
+    """Jobs to unwrap surfaces by a density (m,) of the triangles `parts` of them all, and which way (m,) there is more
+    of it, if there is any."""
+    jobs, start = [], 0
+    for region, (rows, area, _) in zip(regions, parts, strict=True):
+        full, inside = np.ones(len(region.surface.triangles)), np.zeros(len(region.surface.triangles))
+        mine = slice(start, start + len(area))
+        start += len(area)
+        full[rows] = density[mine]
+        if direction is not None:
+            inside[rows] = direction[mine]
+        jobs.append(
+            UnwrapJob(
+                region.surface,
+                region.faces,
+                region.pins if region.pins is not None and region.pins.pinned.any() else None,
+                target=Target(full, None if direction is None else inside),
+                subdivision=region.subdivision,
+                axes=region.axes,
+                was_split=region.was_split,
+            )
+        )
+    return jobs
+
+
 def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
     """Unwrap with the density as target; the share is that of all surfaces together."""
     parts = [region_triangles(region) for region in regions]
@@ -175,23 +200,7 @@ def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
     except MeshError as error:
         raise Refusal(0, error) from error
     density = normalised_density(found.density, area)
-    jobs, start = [], 0
-    for region, (rows, a, w) in zip(regions, parts, strict=True):
-        full, inside = np.ones(len(region.surface.triangles)), np.zeros(len(region.surface.triangles))
-        full[rows], inside[rows] = density[start : start + len(a)], w
-        start += len(a)
-        pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
-        jobs.append(
-            UnwrapJob(
-                region.surface,
-                region.faces,
-                pins,
-                target=Target(full, inside),
-                subdivision=region.subdivision,
-                axes=region.axes,
-                was_split=region.was_split,
-            )
-        )
+    jobs = unwrap_jobs(regions, parts, density, weights)
     if settings.boundary == "own":
         settings = replace(settings, boundary="free")
     layout = yield from lay_out(jobs, settings)

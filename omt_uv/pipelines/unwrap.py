@@ -171,7 +171,7 @@ def _in_one_texture(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> list[U
         return [_standing(options, jobs[0])]
     areas = np.zeros(len(jobs))
     for k, job in enumerate(jobs):
-        surface, chosen = job.surface, slice(None) if job.faces is None else job.faces[job.surface.triangle_face]
+        surface, chosen = job.surface, job.chosen[job.surface.triangle_face]
         # What is not finite is refused in its turn.
         with np.errstate(all="ignore"):
             areas[k] = face_areas(surface.positions, surface.corner_vertex[surface.triangles[chosen]]).sum()
@@ -221,15 +221,15 @@ def _without_flat(
     warnings."""
     rest, flat, warnings = [], [], []
     for index, job in enumerate(jobs):
-        faces = np.ones(len(job.surface.face_start) - 1, dtype=bool) if job.faces is None else job.faces
-        found = flat_triangles(job.surface, faces)
+        found = flat_triangles(job.surface, job.chosen)
         flat.append(found)
         if count := len(found.polygons):
             who = plural(count, "A triangle", "{} triangles")
             warnings.append((index, f"{who} with two corners at one place, left out of the map; {DISSOLVE}"))
-            faces = faces.copy()
+            faces = job.chosen.copy()
             faces[found.polygons] = False
-        rest.append(replace(job, faces=faces, pins=_pins_of_hosts(job.pins, found)) if count else job)
+            job = replace(job, faces=faces, pins=_pins_of_hosts(job.pins, found))
+        rest.append(job)
     return rest, flat, warnings
 
 
@@ -272,11 +272,10 @@ def _joined(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
 
     A modifier subdivides the mesh as it is.
     """
-    surface, count = job.surface, len(job.surface.face_start) - 1
+    surface = job.surface
     if job.subdivision is not None:
         return job, ""
-    faces = np.ones(count, dtype=bool) if job.faces is None else job.faces
-    same = joined_vertices(surface, faces, job.was_split)
+    same = joined_vertices(surface, job.chosen, job.was_split)
     moved = np.flatnonzero(same != np.arange(len(same)))
     if not len(moved):
         return job, ""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...settings import MagnifySettings
-from ...solver.analysis.density import Target, normalised_density
+from ...solver.analysis.density import normalised_density
 from ...solver.analysis.joint_density import joint_density, shares_of
 from ...solver.editing.magnify import OUTLINES
 from ...solver.editing.magnify_regions import JointMagnification, magnify_regions
@@ -24,7 +24,7 @@ from ...solver.mesh.geometry import signed_areas
 from ...solver.parameterization.chart_indices import located
 from ...solver.progress import Steps, part_of
 from ..layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
-from ..magnify import MISSED, Magnified, Region, check_weights, islands_of, region_triangles, uv_areas
+from ..magnify import MISSED, Magnified, Region, check_weights, islands_of, region_triangles, unwrap_jobs, uv_areas
 from ..unwrap import lay_out
 
 # Runs from the mesh that ask for what the one before has missed, at most; and relative errors that need none.
@@ -162,18 +162,8 @@ def _from_mesh(regions: Sequence[NamedRegion], settings: MagnifySettings) -> Ste
 def _jobs(surfaces: Sequence[Region], parts, density: np.ndarray, exponent: np.ndarray) -> list[UnwrapJob]:
     """Jobs to unwrap surfaces by the density (m,) of all of their triangles together."""
     wide = float(np.ptp(exponent))
-    direction = (exponent - exponent.min()) / wide if wide > 0 else np.zeros(len(exponent))
-    jobs, start = [], 0
-    for region, (rows, a, _) in zip(surfaces, parts, strict=True):
-        full, inside = np.ones(len(region.surface.triangles)), np.zeros(len(region.surface.triangles))
-        mine = slice(start, start + len(a))
-        full[rows], inside[rows] = density[mine], direction[mine]
-        start += len(a)
-        pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
-        target = Target(full, inside if wide > 0 else None)
-        job = UnwrapJob(region.surface, region.faces, pins, target=target, axes=region.axes)
-        jobs.append(replace(job, subdivision=region.subdivision, was_split=region.was_split))
-    return jobs
+    direction = (exponent - exponent.min()) / wide if wide > 0 else None
+    return unwrap_jobs(surfaces, parts, density, direction)
 
 
 # ---- from existing UVs --------------------------------------------------------------------------------------

@@ -35,10 +35,9 @@ def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) 
     size = lengths(normal)
     normal /= np.where(size > 0, size, 1)[:, None]
     t, s = pair.T // 3
-    longest = np.maximum(lengths(p[:, 1] - p[:, 0]), np.maximum(lengths(p[:, 2] - p[:, 1]), lengths(p[:, 0] - p[:, 2])))
-    if (needles := size <= 2 * NEEDLE * longest**2).any():
-        long = lengths(positions[triangles[t, pair[:, 0] % 3]] - positions[triangles[t, (pair[:, 0] + 1) % 3]])
-        normal, size = _of_neighbours(normal, needles, np.stack([t, s]), long)
+    side = halfedge_lengths(positions, triangles)
+    if (needles := size <= 2 * NEEDLE * side.reshape(-1, 3).max(axis=1) ** 2).any():
+        normal, size = _of_neighbours(normal, needles, np.stack([t, s]), side[pair[:, 0]])
     one, other = np.take(normal, t, axis=0), np.take(normal, s, axis=0)
     cosine = np.clip(dot3(one, other), -1, 1)
     # The far corner of the one face lies above the other where the surface is hollow.

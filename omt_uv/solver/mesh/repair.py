@@ -122,9 +122,8 @@ def _floors(surface: Surface, faces: np.ndarray, rows: np.ndarray) -> np.ndarray
     double = np.zeros(len(surface.positions), dtype=bool)
     double[surface.corner_vertex[np.isin(owner, rows[:, 0])]] = True
     sides = np.flatnonzero(faces[owner] & double[ends].all(axis=0))
-    twin = np.arange(len(faces))
-    twin[rows[:, 0]] = rows[:, 2]
-    one, other = opposite_sides(np.arange(len(double)), ends[:, sides], twin[owner[sides]])
+    twin = _twins(rows, len(faces))[owner[sides]]
+    one, other = opposite_sides(np.arange(len(double)), ends[:, sides], twin)
     part = graph_components(owner[sides[one]], owner[sides[other]], len(faces))[1]
     # The larger part first: what lies on it is its other side.
     rank = np.argsort(np.argsort(-np.bincount(part), kind="stable"))[part[rows[:, 0]]]
@@ -398,9 +397,9 @@ def _keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a.astype(np.int64) << 32) | b.astype(np.int64)
 
 
-def _twins(surface: Surface, faces: np.ndarray) -> np.ndarray:
-    """A number (f,) for every polygon, the same for those of `faces` (f,) bool that have the same vertices."""
-    number, rows = np.arange(len(faces)), duplicate_faces(surface, faces)
+def _twins(rows: np.ndarray, count: int) -> np.ndarray:
+    """A number for each of so many polygons, the same for those on one another: rows (k,3) of `duplicate_faces`."""
+    number = np.arange(count)
     number[rows[:, 0]] = rows[:, 2]
     return number
 
@@ -424,7 +423,8 @@ def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False
     corners = surface.corner_vertex[border[owner]]
     place, used = np.full(n, -1), np.unique(corners)
     place[used] = places(surface.positions[used])
-    twin = _twins(replace(surface, corner_vertex=place[surface.corner_vertex]), border)
+    doubles = duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), border)
+    twin = _twins(doubles, len(faces))
     sides = ends[:, side]
     first, second = (sides[:, k] for k in opposite_sides(place, sides, twin[owner[side]]))
     if not first.size:
