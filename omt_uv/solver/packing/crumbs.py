@@ -30,6 +30,10 @@ class Gathered:
     crumb: np.ndarray
     begin: np.ndarray
 
+    def kept(self, marks: np.ndarray) -> np.ndarray:
+        """Marks (k,) bool of the islands as they were given, of those that were gathered: a heap has none."""
+        return np.append(marks[~self.crumb], False) if self.crumb.any() else marks
+
     def apart(self, placed: Sequence[np.ndarray]) -> list[np.ndarray]:
         """The islands as they were given, from those that were gathered and then placed."""
         if not self.crumb.any():

@@ -14,12 +14,10 @@ import numpy as np
 from ..mesh.geometry import signed_areas
 from ..mesh.topology import boundary_edges, expand
 
-# Cells between two points that stand for the outline.
-SPACING = 0.5
-# Growth in cells from which on it is measured from cell to cell, which costs less and adds a cell.
-FAR = 4.0
-# Points of an outline that are treated at once.
-BATCH = 20_000
+# Cells that rounding may take from what is near.
+ROUNDING = 1e-9
+# What is lower is a row, and what is shorter a point.
+TINY = 1e-30
 
 
 @dataclass(frozen=True)
@@ -60,55 +58,87 @@ def outlines_of(points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -
     return list(map(IslandOutline, np.split(tail, ends), np.split(head, ends)))
 
 
-def grown_cells(outline: IslandOutline, growth: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (h,w) bool, rows upwards, that touch an island grown by `growth` cells, and the lower left of them (2,)."""
-    corner = np.concatenate([outline.tail, outline.head])
-    low = np.floor(corner.min(axis=0) - growth).astype(np.int64)
-    width, height = np.floor(corner.max(axis=0) + growth).astype(np.int64) + 1 - low
-    moved = outline.scaled(1.0, low)
-    cells = _inside(moved, int(width), int(height))
-    if growth < FAR:
-        _mark_near(cells, moved, growth)
-    else:
-        from scipy.ndimage import distance_transform_edt
+def grown_cells(outlines: Sequence[IslandOutline], growth: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Cells (h,w) bool, rows upwards, that touch each island grown by `growth` cells, and the lower left of them (2,).
 
-        _mark_near(cells, moved, 0.0)
-        # Two points are farther apart than the centres of their cells by a diagonal at most.
-        cells = distance_transform_edt(~cells) <= growth + np.sqrt(2)
-    return cells, low
-
-
-def _inside(outline: IslandOutline, width: int, height: int) -> np.ndarray:
-    """Cells (h,w) bool whose centre the outline goes around."""
-    a, b = outline.tail, outline.head
-    # A segment crosses the lines through the centres of these rows.
-    one, other = a[:, 1] - 0.5, b[:, 1] - 0.5
-    first = np.ceil(np.minimum(one, other)).astype(np.int64)
-    edge, step = expand(np.ceil(np.maximum(one, other)).astype(np.int64) - first)
-    row = first[edge] + step
-    rise = (other - one)[edge]
-    x = a[edge, 0] + (b - a)[edge, 0] * ((row - one[edge]) / rise)
-    column = np.clip(np.ceil(x - 0.5).astype(np.int64), 0, width)
-    turns = np.bincount(row * (width + 1) + column, np.sign(rise), height * (width + 1)).reshape(height, width + 1)
-    return np.abs(np.cumsum(turns, axis=1)[:, :width]) > 0.5
+    All at once: the cells of one box after another, row by row, with one cell more at the end of every row.
+    """
+    if not len(outlines):
+        return []
+    tail, head = (np.concatenate([getattr(o, end) for o in outlines]) for end in ("tail", "head"))
+    count = np.array([len(o.tail) for o in outlines])
+    first, owner = np.cumsum(count) - count, np.repeat(np.arange(len(outlines)), count)
+    low = np.floor(np.minimum.reduceat(np.minimum(tail, head), first) - growth).astype(np.int64)
+    high = np.floor(np.maximum.reduceat(np.maximum(tail, head), first) + growth).astype(np.int64)
+    size = high + 1 - low
+    cells = (size[:, 0] + 1) * size[:, 1]
+    begin = np.cumsum(cells) - cells
+    frame = _Boxes(begin[owner], size[owner], int(cells.sum()))
+    moved = IslandOutline(tail - low[owner], head - low[owner])
+    marked = (np.abs(frame.turns(moved)) > 0.5) | (frame.near(moved, growth) > 0)
+    boxes = np.split(marked, begin[1:])
+    return [(box.reshape(h, w + 1)[:, :-1], corner) for box, (w, h), corner in zip(boxes, size, low, strict=True)]
 
 
-def _mark_near(cells: np.ndarray, outline: IslandOutline, growth: float) -> None:
-    """Mark in `cells` (h,w) bool those that come within `growth` cells of the outline."""
-    along = outline.head - outline.tail
-    count = np.maximum(1, np.ceil(np.linalg.norm(along, axis=1) / SPACING)).astype(np.int64)
-    edge, step = expand(count)
-    points = outline.tail[edge] + along[edge] * (step / count[edge])[:, None]
-    # Ends are among the points, and each stands for half of the spacing on either side.
-    radius = np.hypot(growth, SPACING / 2) + 1e-9
-    reach = int(np.ceil(radius))
-    shift = np.arange(-reach, reach + 1)
-    marked = np.zeros((cells.shape[0] + 2 * reach, cells.shape[1] + 2 * reach), dtype=bool)
-    for start in range(0, len(points), BATCH):
-        some = points[start : start + BATCH]
-        cell = np.floor(some).astype(np.int64)
-        away = np.maximum(0, np.abs(shift - (some - cell - 0.5)[..., None]) - 0.5)
-        near = away[:, 1, :, None] ** 2 + away[:, 0, None, :] ** 2 < radius**2
-        k, row, column = np.nonzero(near)
-        marked[cell[k, 1] + row, cell[k, 0] + column] = True
-    cells |= marked[reach : reach + cells.shape[0], reach : reach + cells.shape[1]]
+@dataclass(frozen=True)
+class _Boxes:
+    """For each of e segments where the cells of its box `begin` (e,), and the `size` (e,2) of that; `count` cells in
+    all. Sums along rows are sums along all: what begins in a row ends in it."""
+
+    begin: np.ndarray
+    size: np.ndarray
+    count: int
+
+    def turns(self, outline: IslandOutline) -> np.ndarray:
+        """How often the outlines go around the centre of every cell."""
+        a, b = outline.tail, outline.head
+        # A segment crosses the lines through the centres of these rows.
+        one, other = a[:, 1] - 0.5, b[:, 1] - 0.5
+        first = np.ceil(np.minimum(one, other)).astype(np.int64)
+        edge, step = expand(np.ceil(np.maximum(one, other)).astype(np.int64) - first)
+        row = first[edge] + step
+        rise = (other - one)[edge]
+        x = a[edge, 0] + (b - a)[edge, 0] * ((row - one[edge]) / rise)
+        column = np.clip(np.ceil(x - 0.5).astype(np.int64), 0, self.size[edge, 0])
+        return np.cumsum(np.bincount(self._numbers(edge, row, column), np.sign(rise), self.count))
+
+    def near(self, outline: IslandOutline, growth: float) -> np.ndarray:
+        """How many segments come as near to every cell as `growth`.
+
+        What is as near to a segment is convex: two disks, and a rectangle between. In a row it goes from the leftmost
+        of these to the rightmost.
+        """
+        a, b = outline.tail, outline.head
+        # Cells that are touched from outside count, whatever rounding says.
+        reach = growth + ROUNDING
+        bottom = np.maximum(np.floor(np.minimum(a[:, 1], b[:, 1]) - reach).astype(np.int64), 0)
+        top = np.minimum(np.floor(np.maximum(a[:, 1], b[:, 1]) + reach).astype(np.int64), self.size[:, 1] - 1)
+        edge, step = expand(top - bottom + 1)
+        row = bottom[edge] + step
+        a, b = a[edge], b[edge]
+        left, right = np.full(len(edge), np.inf), np.full(len(edge), -np.inf)
+        for centre in (a, b):
+            away = np.maximum(0, np.maximum(row - centre[:, 1], centre[:, 1] - row - 1))
+            half = np.sqrt(np.maximum(reach**2 - away**2, 0))
+            left = np.where(away <= reach, np.minimum(left, centre[:, 0] - half), left)
+            right = np.where(away <= reach, np.maximum(right, centre[:, 0] + half), right)
+        along = b - a
+        length = np.maximum(np.hypot(*along.T), TINY)
+        aside = reach * np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+        # A side that lies in one row comes and leaves at infinity.
+        rise = np.where(np.abs(along[:, 1]) < TINY, TINY, along[:, 1])
+        for side in (aside, -aside):
+            begin = a + side
+            comes, leaves = np.sort((row + np.array([[0], [1]]) - begin[:, 1]) / rise, axis=0)
+            is_there = (leaves >= 0) & (comes <= 1)
+            x = begin[:, 0] + along[:, 0] * np.clip([comes, leaves], 0, 1)
+            left = np.where(is_there, np.minimum(left, x.min(axis=0)), left)
+            right = np.where(is_there, np.maximum(right, x.max(axis=0)), right)
+        column, last = (np.clip(np.floor(x).astype(np.int64), 0, self.size[edge, 0] - 1) for x in (left, right))
+        begins = np.bincount(self._numbers(edge, row, column), minlength=self.count)
+        ends = np.bincount(self._numbers(edge, row, last + 1), minlength=self.count)
+        return np.cumsum(begins - ends)
+
+    def _numbers(self, edge: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """The cells in rows and columns of the boxes of segments."""
+        return self.begin[edge] + row * (self.size[edge, 0] + 1) + column

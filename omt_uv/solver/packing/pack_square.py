@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import MarginError
 from ..progress import Progress, Steps, part_of
-from .crumbs import gathered
+from .crumbs import Gathered, gathered
 from .outline_raster import IslandOutline, grown_cells, island_areas, outlines_of
 from .placement import Item, Place, place, turned_masks
 from .raster_grid import RasterGrid
@@ -33,6 +33,7 @@ BLOCKS = 64
 # the picture.
 SMALL = 0.2
 QUARTERS = (0, 1, 3)
+ANY_SIDE = (0, 1, 2, 3)
 # The first scale fills this share of the square; then come smaller ones until one fits, by this factor first, and then
 # by one that is smaller every time.
 FIRST_SHARE = 0.75
@@ -73,13 +74,14 @@ class Packing:
 
 @dataclass(frozen=True)
 class _PackTask:
-    """Outlines of islands, their triangles' area, and what the square is: pixels, margin, and outlines that stay; and
-    small masks that were turned."""
+    """Outlines of islands, their triangles' area, which of them may lie on any side, and what the square is: pixels,
+    margin, and outlines that stay; and small masks that were turned."""
 
     outlines: list[IslandOutline]
     areas: np.ndarray
     low: np.ndarray
     sizes: np.ndarray
+    loose: np.ndarray
     margin: float
     texture_size: int
     raster: int
@@ -134,6 +136,7 @@ def pack(
     texture_size: int = 1024,
     around: Sequence[tuple[np.ndarray, np.ndarray]] = (),
     roughly: bool = False,
+    loose: np.ndarray | None = None,
 ) -> Steps[Packing]:
     """Place islands in the unit square without overlap, all scaled by the same factor.
 
@@ -147,6 +150,7 @@ def pack(
     texture_size : pixels along a side of the unit square
     around : points (n,2) and triangles (m,3), of islands that stay in the unit square as they are
     roughly : on the coarse raster alone, in half of the time, to be compared with another packing
+    loose : (k,) bool, islands that may lie on any side, none by default
 
     Raises
     ------
@@ -166,7 +170,8 @@ def pack(
     if len(heaped.points) == 1 and not len(around):
         placed, scale = _alone(points[0], (texture_size - margin) / texture_size)
     else:
-        task = _task(heaped.points, heaped.triangles, margin, texture_size, around)
+        free = np.zeros(len(islands), dtype=bool) if loose is None else loose
+        task = _task(heaped, heaped.kept(free), margin, texture_size, around)
         found = yield from _search(task, roughly)
         placed, scale = _filled(_placed(heaped.points, found), found.task, found.scale)
     placed = heaped.apart(placed)
@@ -202,7 +207,8 @@ def _alone(points: np.ndarray, width: float) -> tuple[list[np.ndarray], float]:
     return [(points - 0.5 * (low + high)) * scale + 0.5], scale
 
 
-def _task(points, faces, margin: float, texture_size: int, around) -> _PackTask:
+def _task(islands: Gathered, loose: np.ndarray, margin: float, texture_size: int, around) -> _PackTask:
+    points, faces = islands.points, islands.triangles
     low = np.array([p.min(axis=0) for p in points])
     staying = outlines_of([p * COARSE for p, _ in around], [t for _, t in around])
     return _PackTask(
@@ -210,6 +216,7 @@ def _task(points, faces, margin: float, texture_size: int, around) -> _PackTask:
         areas=island_areas(points, faces),
         low=low,
         sizes=np.array([p.max(axis=0) for p in points]) - low,
+        loose=loose,
         margin=margin,
         texture_size=texture_size,
         raster=COARSE,
@@ -308,8 +315,7 @@ def _fit(task: _PackTask, scale: float, order: list[int], orders: int) -> tuple[
 def _grid(task: _PackTask, widest: int) -> RasterGrid:
     """An empty raster but for the islands that stay."""
     grid = RasterGrid(task.raster, widest + 8)
-    for outline in task.staying:
-        cells, low = grown_cells(outline, task.growth)
+    for cells, low in grown_cells(task.staying, task.growth):
         first = np.maximum(low, 0)
         last = np.minimum(low + cells.shape[::-1], task.raster)
         if (last > first).all():
@@ -324,11 +330,13 @@ def _rasterised(task: _PackTask, scale: float) -> _Raster:
     largest = np.argsort(-task.sizes.prod(axis=1), kind="stable")
     single = largest if count <= MOST_ITEMS else largest[: MOST_ITEMS - BLOCKS]
     turnable = task.areas < SMALL * task.areas.sum()
-    items, corners = [], np.zeros((len(single), 2))
-    for k, number in enumerate(single.tolist()):
-        cells, low = grown_cells(task.outlines[number].scaled(scale, scale * task.low[number]), task.growth)
-        items.append(task.item(cells, QUARTERS if turnable[number] else (0,)))
-        corners[k] = low
+    scaled = [task.outlines[number].scaled(scale, scale * task.low[number]) for number in single.tolist()]
+    grown = grown_cells(scaled, task.growth)
+    turns = [
+        ANY_SIDE if loose else QUARTERS if small else (0,) for loose, small in zip(task.loose, turnable, strict=True)
+    ]
+    items = [task.item(cells, turns[k]) for k, (cells, _) in zip(single, grown, strict=True)]
+    corners = np.array([low for _, low in grown], dtype=float)
     blocks = []
     if count > len(single):
         rest = largest[len(single) :]

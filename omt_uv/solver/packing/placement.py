@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .raster_grid import RasterGrid, runs_of
+from .raster_grid import RasterGrid, rectangles_of
 
 # What is at most so many cells beside a mask touches it.
 BESIDE = 2
@@ -17,11 +17,11 @@ UPRIGHT = 0.02
 
 @dataclass(frozen=True)
 class Turned:
-    """A mask (h,w) bool turned by `quarters` counterclockwise, its runs, and the cells (k,2) x, y beside it."""
+    """A mask (h,w) bool turned by `quarters` counterclockwise, its rectangles, and the cells (k,2) x, y beside it."""
 
     mask: np.ndarray
     quarters: int
-    runs: list[list[int]]
+    rectangles: list[list[int]]
     beside: np.ndarray
 
 
@@ -54,7 +54,7 @@ class Place:
 def turned_masks(mask: np.ndarray, quarters: Sequence[int]) -> Item:
     """A mask (h,w) bool in the turns it may have, the first of which is preferred."""
     turns: list[Turned] = []
-    beside = _beside(mask)
+    beside, halves = _beside(mask), dict[int, np.ndarray]()
     for number in quarters:
         turned, cells, (height, width) = mask, beside, mask.shape
         for _ in range(number):
@@ -64,8 +64,20 @@ def turned_masks(mask: np.ndarray, quarters: Sequence[int]) -> Item:
         if any(np.array_equal(turned, other.mask) for other in turns):
             # It fits where that one does, which comes first: rectangles have two turns, squares one.
             continue
-        turns.append(Turned(turned, number, runs_of(turned), cells))
+        if number % 2 in halves:
+            # Turned by half.
+            power, tall, row, column = halves[number % 2].T
+            found = np.column_stack([power, tall, height - (1 << tall) - row, width - (1 << power) - column])
+        else:
+            found = halves[number % 2] = rectangles_of(turned)
+        turns.append(Turned(turned, number, _in_order(found), cells))
     return Item(tuple(turns))
+
+
+def _in_order(rectangles: np.ndarray) -> list[list[int]]:
+    """Rectangles (k,4), those that look at the same copy of a raster one after the other."""
+    power, tall, row, column = rectangles.T
+    return rectangles[np.lexsort((row, tall, column & 7, power))].tolist()
 
 
 def _beside(mask: np.ndarray) -> np.ndarray:
@@ -101,33 +113,14 @@ def _best(item: Item, grid: RasterGrid) -> tuple[Turned, int, int] | None:
     best, most = None, -np.inf
     for turned in item.turns:
         height, width = turned.mask.shape
-        free = grid.places(turned.runs, height, width)
+        free = grid.places(turned.rectangles, height, width)
         if free is None:
             continue
-        for x, y in _extremes(free):
-            # Of places that touch as much, the lowest, then the leftmost.
-            value = _touch(turned, x, y, grid) - UPRIGHT * (turned is not item.turns[0])
-            value -= 1e-3 * (y + height + 1e-3 * x) / grid.side
-            if value > most:
-                best, most = (turned, x, y), value
+        ends = np.array(sorted(free.ends()))
+        # Of places that touch as much, the lowest, then the leftmost.
+        value = grid.taken_share(turned.beside, ends) - UPRIGHT * (turned is not item.turns[0])
+        value -= 1e-3 * (ends[:, 1] + height + 1e-3 * ends[:, 0]) / grid.side
+        first = int(np.argmax(value))
+        if value[first] > most:
+            best, most = (turned, *ends[first].tolist()), value[first]
     return best
-
-
-def _extremes(free: np.ndarray) -> set[tuple[int, int]]:
-    """Places (x, y) at the ends of the outermost rows and columns that have any, of (rows,columns) bool."""
-    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
-    found = set()
-    for y in (int(rows[0]), int(rows[-1])):
-        there = np.flatnonzero(free[y])
-        found |= {(int(there[0]), y), (int(there[-1]), y)}
-    for x in (int(columns[0]), int(columns[-1])):
-        there = np.flatnonzero(free[:, x])
-        found |= {(x, int(there[0])), (x, int(there[-1]))}
-    return found
-
-
-def _touch(turned: Turned, x: int, y: int, grid: RasterGrid) -> float:
-    """Share of the cells beside a mask that are taken, or outside, where it is placed at (x, y)."""
-    # Cells of negative numbers are the last ones, beyond the raster: they are taken, too.
-    taken = grid.taken_around[turned.beside[:, 1] + y, turned.beside[:, 0] + x]
-    return np.count_nonzero(taken) / len(taken)

@@ -7,7 +7,7 @@ import pytest
 from omt_uv.solver.mesh.topology import boundary_edges
 from omt_uv.solver.packing.outline_raster import grown_cells, outlines_of
 from omt_uv.solver.packing.placement import BESIDE, place, turned_masks
-from omt_uv.solver.packing.raster_grid import RasterGrid, runs_of
+from omt_uv.solver.packing.raster_grid import RasterGrid, rectangles_of
 from omt_uv.solver.packing.shelves import blocks_of
 
 
@@ -17,11 +17,17 @@ def blob(rng, height, width):
     return mask
 
 
+def free_places(grid, mask):
+    """The cells at which a mask is free; None where there are none."""
+    found = grid.places(rectangles_of(mask).tolist(), *mask.shape)
+    return found and np.unpackbits(found.bits, axis=1, count=grid.side - mask.shape[1] + 1).astype(bool)
+
+
 @pytest.mark.parametrize("growth", [0.0, 0.7, 2.3, 5.0])
 def test_cells_are_those_that_the_grown_island_touches(growth):
     V, F = meshes.random_disk(count=120)
     points = V[:, :2] * 17.3 + [3.3, -8.1]
-    cells, low = grown_cells(outlines_of([points], [F])[0], growth)
+    ((cells, low),) = grown_cells(outlines_of([points], [F]), growth)
     rng = np.random.default_rng(0)
     # Samples of the island, and of a circle of that radius around its outline, all lie in the cells.
     weights = rng.dirichlet(np.ones(3), (len(F), 40))
@@ -39,7 +45,31 @@ def test_cells_are_those_that_the_grown_island_touches(growth):
     centres = np.stack([columns, rows], axis=1) + low + 0.5
     samples = np.concatenate([inside, on_it])
     nearest = np.array([np.hypot(*(samples - c).T).min() for c in centres])
-    assert nearest.max() < growth + 2 * np.sqrt(2) + 0.5
+    assert nearest.max() < growth + np.sqrt(0.5) + 0.2
+
+
+@pytest.mark.parametrize("growth", [0.0, 1.5])
+def test_cells_of_several_islands_are_those_of_each(growth):
+    several = [meshes.random_disk(count=30), meshes.grid(3, 2), meshes.random_disk(count=20)]
+    outlines = outlines_of([V[:, :2] * 9 - 2.3 for V, _ in several], [F for _, F in several])
+    for (cells, low), outline in zip(grown_cells(outlines, growth), outlines, strict=True):
+        ((alone, corner),) = grown_cells([outline], growth)
+        assert np.array_equal(cells, alone) and np.array_equal(low, corner)
+    assert grown_cells([], growth) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rectangles_are_the_mask_and_rows_that_are_alike_are_one(seed):
+    rng = np.random.default_rng(seed)
+    mask = blob(rng, *rng.integers(1, 20, 2))
+    found = np.zeros(mask.shape, bool)
+    for power, tall, row, column in rectangles_of(mask):
+        assert mask[row : row + 2**tall, column : column + 2**power].all()
+        found[row : row + 2**tall, column : column + 2**power] = True
+    assert np.array_equal(found, mask)
+    # Of 2^k cells by 2^k one is enough, and of others two in either direction.
+    assert rectangles_of(np.ones((16, 8), bool)).tolist() == [[3, 4, 0, 0]]
+    assert len(rectangles_of(np.ones((13, 9), bool))) == 4
 
 
 def test_outlines_of_several_islands_are_their_own():
@@ -56,6 +86,10 @@ def test_cells_beside_a_mask_are_those_a_few_steps_away_in_every_turn(seed):
     rng = np.random.default_rng(seed)
     for turned in turned_masks(blob(rng, *rng.integers(1, 9, 2)), (0, 1, 2, 3)).turns:
         row, column = np.nonzero(turned.mask)
+        covered = np.zeros(turned.mask.shape, bool)
+        for power, tall, low, left in turned.rectangles:
+            covered[low : low + 2**tall, left : left + 2**power] = True
+        assert np.array_equal(covered, turned.mask)
         y, x = np.mgrid[-BESIDE : turned.mask.shape[0] + BESIDE, -BESIDE : turned.mask.shape[1] + BESIDE]
         steps = (np.abs(y[..., None] - row) + np.abs(x[..., None] - column)).min(axis=2)
         expected = (steps > 0) & (steps <= BESIDE)
@@ -70,7 +104,7 @@ def test_places_are_all_free_ones_also_after_more_is_taken(seed):
     for _ in range(4):
         mask = blob(rng, *rng.integers(1, 12, 2))
         height, width = mask.shape
-        found = grid.places(runs_of(mask), height, width)
+        found = free_places(grid, mask)
         expected = np.array(
             [
                 [not (taken[y : y + height, x : x + width] & mask).any() for x in range(38 - width)]
@@ -91,13 +125,40 @@ def test_masks_as_wide_as_the_raster_have_the_places_that_they_have():
     grid, taken = RasterGrid(37, 45), np.zeros((37, 37), bool)
     for y, length in ((0, 37), (1, 36), (2, 33), (3, 5), (3, 31)):
         mask = np.ones((1, length), bool)
-        found = grid.places(runs_of(mask), 1, length)
+        found = free_places(grid, mask)
         expected = [[not row[x : x + length].any() for x in range(38 - length)] for row in taken]
         assert np.array_equal(found, expected)
         x = int(np.flatnonzero(found[y])[-1])
         grid.take(mask, x, y)
         taken[y, x : x + length] = True
-    assert grid.taken_around.shape[0] > 37 and grid.taken_around[37:].all() and grid.taken_around[:, 37:].all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_lies_beside_a_mask_is_taken_or_outside(seed):
+    rng = np.random.default_rng(seed)
+    grid, mask = RasterGrid(21, 8), blob(rng, 9, 7)
+    grid.take(mask, 6, 5)
+    taken = np.ones((25, 25), bool)
+    taken[2:-2, 2:-2] = grid.taken
+    (turned,) = turned_masks(blob(rng, 4, 3), (0,)).turns
+    height, width = turned.mask.shape
+    places = np.array([[0, 0], [21 - width, 0], [0, 21 - height], [21 - width, 21 - height], [5, 6]])
+    expected = [[taken[2 + y + b, 2 + x + a] for a, b in turned.beside] for x, y in places]
+    np.testing.assert_allclose(grid.taken_share(turned.beside, places), np.mean(expected, axis=1))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ends_of_free_places_are_those_of_the_outermost_rows_and_columns(seed):
+    rng = np.random.default_rng(seed)
+    grid, mask = RasterGrid(30, 8), np.ones((3, 2), bool)
+    for _ in range(12):
+        grid.take(np.ones((2, 2), bool), *rng.integers(0, 29, 2).tolist())
+    y, x = np.nonzero(free_places(grid, mask))
+    expected = {(x[y == row].min(), row) for row in (y.min(), y.max())}
+    expected |= {(x[y == row].max(), row) for row in (y.min(), y.max())}
+    expected |= {(column, y[x == column].min()) for column in (x.min(), x.max())}
+    expected |= {(column, y[x == column].max()) for column in (x.min(), x.max())}
+    assert grid.places(rectangles_of(mask).tolist(), 3, 2).ends() == expected
 
 
 def test_a_copy_of_a_raster_is_taken_by_itself():
@@ -105,7 +166,7 @@ def test_a_copy_of_a_raster_is_taken_by_itself():
     other = grid.copy()
     other.take(mask, 4, 5)
     assert other.taken.sum() == 9 and not grid.taken.any()
-    assert grid.places(runs_of(mask), 3, 3).all() and not other.places(runs_of(mask), 3, 3)[5, 4]
+    assert free_places(grid, mask).all() and not free_places(other, mask)[5, 4]
 
 
 def test_placed_masks_share_no_cell():
