@@ -40,16 +40,19 @@ def pack_turned(
     count = (ANGLES_ALONE if len(islands) == 1 else ANGLES) if large.any() else 0
     for k, angle in enumerate(np.linspace(0, np.pi / 2, count, endpoint=False)):
         turned = [_turned(uv, angle) if is_large else uv for uv, is_large in zip(boxed, large, strict=True)]
-        trying = pack(turned, triangles, margin, texture_size, around, roughly=True)
+        trying = pack(turned, triangles, margin, texture_size, around, roughly=True, loose=may)
         scale = (yield from part_of(trying, TRYING * k / count, TRYING / count)).scale
         if scale > most:
             best, most = turned, scale
     begin = TRYING if count else 0.0
-    return (yield from part_of(pack(best, triangles, margin, texture_size, around), begin, 1 - begin))
+    return (yield from part_of(pack(best, triangles, margin, texture_size, around, loose=may), begin, 1 - begin))
 
 
 def in_smallest_box(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """A map (n,2) turned so that the box around its triangles (m,3) is smallest: along a side of their convex hull."""
+    """A map (n,2) turned so that the box around its triangles (m,3) is smallest: along a side of their convex hull.
+
+    The box lies on its longer side, and the middle of the hull below its own: however the map lay before.
+    """
     points = uv[np.unique(triangles)]
     # Joggled, since slivers have no hull in double precision.
     hull = points[ConvexHull(points, qhull_options="QJ").vertices]
@@ -58,7 +61,11 @@ def in_smallest_box(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     across = np.stack([-side[:, 1], side[:, 0]], axis=1)
     extents = [np.ptp(hull @ direction.T, axis=0) for direction in (side, across)]
     best = int(np.argmin(extents[0] * extents[1]))
-    return uv @ np.stack([side[best], across[best]], axis=1)
+    axes = np.stack([side[best], across[best]], axis=1)
+    if extents[0][best] < extents[1][best]:
+        axes = np.stack([across[best], -side[best]], axis=1)
+    height = (hull @ axes)[:, 1]
+    return uv @ (axes if height.mean() <= 0.5 * (height.min() + height.max()) else -axes)
 
 
 def _turned(uv: np.ndarray, angle: float) -> np.ndarray:
