@@ -73,7 +73,7 @@ def grown_cells(outlines: Sequence[IslandOutline], growth: float) -> list[tuple[
     size = high + 1 - low
     cells = (size[:, 0] + 1) * size[:, 1]
     begin = np.cumsum(cells) - cells
-    frame = _Boxes(begin[owner], size[owner], int(cells.sum()))
+    frame = _CellRows(begin[owner], size[owner], int(cells.sum()))
     moved = IslandOutline(tail - low[owner], head - low[owner])
     marked = (np.abs(frame.turns(moved)) > 0.5) | (frame.near(moved, growth) > 0)
     boxes = np.split(marked, begin[1:])
@@ -81,7 +81,7 @@ def grown_cells(outlines: Sequence[IslandOutline], growth: float) -> list[tuple[
 
 
 @dataclass(frozen=True)
-class _Boxes:
+class _CellRows:
     """For each of e segments where the cells of its box `begin` (e,), and the `size` (e,2) of that; `count` cells in
     all. Sums along rows are sums along all: what begins in a row ends in it."""
 

@@ -23,7 +23,7 @@ def test_cells_are_marked_that_come_near_an_outline(growth, level):
     p = np.array([[6, 6.5], [15, 6.5], [15, 6.5], [15, 12], [6.3, 12.0]]) if level else p
     outline = outline_raster.IslandOutline(p, np.roll(p, -1, axis=0))
     size = np.tile([24, 24], (5, 1))
-    boxes = outline_raster._Boxes(np.zeros(5, np.int64), size, 25 * 24)
+    boxes = outline_raster._CellRows(np.zeros(5, np.int64), size, 25 * 24)
     cells = (boxes.near(outline, growth) > 0).reshape(24, 25)
     t = np.linspace(0, 1, 4000)[:, None]
     points = np.concatenate([a + t * (b - a) for a, b in zip(outline.tail, outline.head, strict=True)])
