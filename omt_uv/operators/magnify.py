@@ -324,6 +324,7 @@ def draw_more(layout: bpy.types.UILayout, properties, listed: bool = True) -> No
     column.prop(properties, "max_shear")
     column.prop(properties, "use_subdivision", text="Subdivision")
     draw_margin(layout, properties)
+    layout.prop(properties, "tile")
 
 
 def _draw_list(layout: bpy.types.UILayout, obj: bpy.types.Object | None) -> None:

@@ -93,7 +93,6 @@ def draw_balance(layout: bpy.types.UILayout, properties) -> None:
 def draw_margin(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "margin", text="Margin", text_ctxt=CONTEXT)
     layout.prop(properties, "texture_size")
-    layout.prop(properties, "tile")
 
 
 def choose_group(layout: bpy.types.UILayout, properties, name: str) -> None:

@@ -72,3 +72,4 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column = layout.column()
     column.active = properties.pack and not properties.keep_boundary
     draw_margin(column, properties)
+    column.prop(properties, "tile")

@@ -145,8 +145,8 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
 
         objects, readings = read_writable(context, self.uv_layer)
         with complaints(objects=objects):
-            free = avoided(objects, self.keep_free)
-            marked = map_markers(objects, {role: getattr(self, name) for role, name in MARKERS.items()})
+            free = avoided(objects, kept_free(self))
+            marked = map_markers(objects, groups_of_markers(self))
             jobs = [
                 UnwrapJob.of(r, modifier, avoid, marks)
                 for r, avoid, marks, modifier in zip(readings, free, marked, self.subdivisions(readings), strict=True)
@@ -157,6 +157,17 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
     def finish(self, context: bpy.types.Context, result) -> None:
         objects, layout = result
         warn(self, objects, write_result(self, objects, layout))
+
+
+def kept_free(chosen) -> str:
+    """Vertex group that cuts avoid; none where there are no cuts but those that exist."""
+    return "" if chosen.seams == "EXISTING" else chosen.keep_free
+
+
+def groups_of_markers(chosen) -> dict[str, str]:
+    """Vertex groups of markers by what they mark: of outlines that are free, what goes to the right alone counts."""
+    counting = MARKERS if chosen.boundary != "FREE" else ("start",)
+    return {role: getattr(chosen, name) if role in counting else "" for role, name in MARKERS.items()}
 
 
 def write_result(chosen, objects: list, layout) -> list[tuple[int, str]]:
@@ -220,4 +231,6 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     column.prop(properties, "pack_around")
     column.prop(properties, "turn_to_fit")
     draw_margin(column, properties)
+    # What is not packed lies in it, too.
+    layout.prop(properties, "tile")
     choose_layer(layout, properties, "uv_layer")

@@ -197,6 +197,41 @@ def test_the_start_is_as_it_was(drag):
         assert (state(objects) == before) == (at == START)
 
 
+def test_a_turn_of_the_wheel_is_as_if_the_drag_had_begun_with_that_radius(drag):
+    objects, begin, name = drag
+    before = state(objects)
+    turned = begin()
+    turned.hears("MOUSEMOVE", at=(40, 60))
+    for kind in ("WHEELUPMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"):
+        turned.hears(kind, at=(40, 60))
+    turned.hears("MOUSEMOVE", at=END)
+    shown = state(objects)
+    turned.hears("ESC", "PRESS")
+    assert state(objects) == before != shown
+    other = begin()
+    other.radius = turned.radius
+    other.begin_drag(bpy.context)
+    other.hears("MOUSEMOVE", at=END)
+    assert state(objects) == shown
+    other.hears("ESC", "PRESS")
+    assert state(objects) == before
+
+
+@pytest.mark.parametrize("axis", range(3), ids="xyz")
+def test_what_is_dragged_along_an_axis_is_where_the_mouse_is(axis):
+    objects = bodies()
+    shift = 0.1 * np.eye(3)[axis]
+    operator = scenes.stand_in("object.omt_flow", result="MESH")
+    operator.begin_drag(bpy.context)
+    held = [[v.index for v in obj.data.vertices if v.select] for obj in objects]
+    start = [np.array([obj.data.vertices[k].co[:] for k in chosen]) for obj, chosen in zip(objects, held, strict=True)]
+    for times in (1.0, 2.0, -1.0):
+        assert operator._drag.to(times * shift)
+        for obj, chosen, places in zip(objects, held, start, strict=True):
+            now = np.array([obj.data.vertices[k].co[:] for k in chosen])
+            np.testing.assert_allclose(now, places + times * shift, atol=2e-3)
+
+
 def test_what_is_kept_is_what_the_operator_makes_of_what_was_there(drag):
     objects, begin, name = drag
     operator = begin()

@@ -150,6 +150,34 @@ def test_picked_vertices_turn_the_globe():
     assert np.abs(uv[vertex == picks[2], 0] - 0.75).max() < 0.1
 
 
+@pytest.mark.parametrize("others", [0, 3])
+def test_what_is_picked_on_the_active_object_turns_it_alone(others):
+    """Whatever is picked on another one, which goes by its axes."""
+    import bmesh
+
+    alone = {}
+    for chosen in ("both", "Ball", "Other"):
+        scenes.open_empty()
+        found = {name: ball() for name in ("Other", "Ball")}
+        for name, obj in found.items():
+            obj.name = name
+        scenes.select([found[name] for name in ("Other", "Ball") if chosen in ("both", name)])
+        bpy.context.view_layer.objects.active = found["Ball" if chosen == "both" else chosen]
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
+        for name, picks in (("Ball", [3, 40, 17]), ("Other", [5, 30, 60][:others])):
+            if found[name].mode == "EDIT":
+                edit = bmesh.from_edit_mesh(found[name].data)
+                edit.verts.ensure_lookup_table()
+                for k in picks:
+                    edit.select_history.add(edit.verts[k])
+        project(quality="DRAFT", orientation="AXES" if chosen == "Other" else "PICKED")
+        scenes.leave_edit()
+        alone[chosen] = {name: scenes.uv_of(obj) for name, obj in found.items() if obj.data.uv_layers}
+    for name in ("Ball", "Other"):
+        np.testing.assert_allclose(alone["both"][name], alone[name][name], atol=1e-6)
+
+
 def test_undo_takes_back_all():
     obj = ball()
     before = scenes.state(obj)

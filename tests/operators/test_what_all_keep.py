@@ -233,3 +233,19 @@ def test_in_edit_mode_chosen_faces_change_and_no_others_and_the_mode_stays(name)
     first, second = results
     assert first[corners].any() and not first[~corners].any()
     assert second[~corners].any() and not second[corners].any()
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def test_uvs_of_faces_that_are_not_chosen_may_be_no_numbers(name):
+    obj, chosen = twice(name)
+    layer = obj.data.uv_layers.active.name
+    corners = np.repeat(chosen, [p.loop_total for p in obj.data.polygons])
+    broken = scenes.uv_of(obj)
+    broken[~corners] = np.nan
+    scenes.set_uv(obj, broken, layer)
+    scenes.edit(obj, faces=chosen)
+    assert run(name)(**CHOSEN[name]) == {"FINISHED"}
+    scenes.leave_edit()
+    after = scenes.uv_of(obj)
+    assert np.isfinite(after[corners]).all() and np.isnan(after[~corners]).all()
+    assert (after[corners] != broken[corners]).any()

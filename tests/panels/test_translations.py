@@ -147,6 +147,29 @@ def test_everything_that_is_shown_has_its_words(package, language):
     assert not missing, f"{language} has no words for {missing}"
 
 
+def in_contexts(package):
+    """Pairs of a context and what is shown in it: of classes, that which they name or Blender's own, of buttons and
+    settings that name one that, of other buttons that of operators."""
+    for cls in classes(package):
+        usual = "Operator" if issubclass(cls, bpy.types.Operator) else "*"
+        yield getattr(cls, "bl_translation_context", usual), getattr(cls, "bl_label", "")
+    own = package("settings").CONTEXT
+    for node in trees("panels/*.py", "operators/**/*.py"):
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+            continue
+        given = {keyword.arg: keyword.value for keyword in node.keywords}
+        usual = "Operator" if node.func.attr == "operator" else "*"
+        yield own if getattr(given.get("text_ctxt"), "id", "") == "CONTEXT" else usual, constant(given.get("text"))
+
+
+def test_what_is_shown_has_its_words_in_the_context_in_which_it_is_shown(package):
+    shown = {(context, text) for context, text in in_contexts(package) if text not in CODE}
+    assert {context for context, _ in shown} == {"*", "Operator", package("settings").CONTEXT}
+    for language, table in package("panels.translations.registered").tables_of().items():
+        missing = sorted(pair for pair in shown if any(c.isalpha() for c in pair[1]) and pair not in table)
+        assert not missing, f"{language} has no words for {missing}"
+
+
 def test_one_and_several_have_words_of_their_own(package):
     counted = package("session.language").counted
     texts = ("Opened {} part along {}", "Opened {} parts along {}")

@@ -106,6 +106,13 @@ def test_polygons_that_vanish_are_given_a_place():
     density = subdivided_target(flat, MODIFIER).density
     middle = np.median(density[flat.triangle_face != 7])
     assert (density >= 0.0099 * middle).all() and (density <= 101 * middle).all()
+    # Nor is one asked for that is a needle on either side, so that nothing else would be left for the others.
+    thin = surface.positions.copy()
+    corners = surface.corner_vertex[4 * 7 : 4 * 8]
+    thin[corners[2:]] = thin[corners[[1, 0]]] + 1e-7 * (thin[corners[2:]] - thin[corners[[1, 0]]])
+    density = subdivided_target(replace(surface, positions=thin), MODIFIER).density
+    middle = np.median(density)
+    assert density.max() > 99 * middle and (density >= 0.0099 * middle).all() and (density <= 101 * middle).all()
     # Where none has an area, all are alike.
     nowhere = replace(surface, positions=0 * surface.positions)
     np.testing.assert_array_equal(subdivided_target(nowhere, MODIFIER).density, np.ones(2 * count))

@@ -230,8 +230,7 @@ def _header(ply: PlyMesh, count: int) -> bytes:
         lines[vertex.line] = lines[vertex.line].replace(b" %d" % vertex.count, b" %d" % count)
     if not ply.pairs:
         last = vertex.property_lines[-1]
-        end = b"\r\n" if lines[last].endswith(b"\r\n") else b"\n"
-        lines[last] += b"".join(b"property float " + name.encode() + end for name in PAIRS[0])
+        lines[last] += b"".join(b"property float " + name.encode() + ply.header.end for name in PAIRS[0])
     return b"".join(lines)
 
 
@@ -262,7 +261,7 @@ def _text_vertices(ply: PlyMesh, split: Split, old: np.ndarray | None) -> bytes:
         begin, end = int(rows.start[source]), int(rows.start[source + 1])
         line = ply.data[begin:end]
         if not line.endswith(b"\n"):
-            line += b"\n"
+            line += ply.header.end
         if old is None:
             bare = line.rstrip()
             out.append(bare + b" " + b" ".join(_digits(split.uv[k])) + line[len(bare) :])

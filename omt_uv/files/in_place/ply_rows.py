@@ -64,6 +64,11 @@ class Header:
         """Bytes of the header."""
         return sum(map(len, self.lines))
 
+    @property
+    def end(self) -> bytes:
+        """What its lines end with."""
+        return b"\r\n" if self.lines[-1].endswith(b"\r\n") else b"\n"
+
     def find(self, name: str) -> Element:
         """The element of this name; InPlaceError if there is none."""
         for element in self.elements:

@@ -132,14 +132,14 @@ class UV_OT_omt_queue(bpy.types.Operator):
         from ...blender.vertex_groups import avoided, map_markers
         from ...pipelines.layout import UnwrapJob
         from ...pipelines.unwrap import lay_out
-        from ..unwrap import MARKERS, UV_OT_omt_unwrap
+        from ..unwrap import UV_OT_omt_unwrap, groups_of_markers, kept_free
 
         chosen = context.window_manager.operator_properties_last(UNWRAP)
         with complaints(obj):
             check_target(obj, chosen.uv_layer)
             reading = read(obj)
-            (avoid,) = avoided([obj], _own(obj, chosen.keep_free))
-            (marks,) = map_markers([obj], {role: _own(obj, getattr(chosen, name)) for role, name in MARKERS.items()})
+            (avoid,) = avoided([obj], _own(obj, kept_free(chosen)))
+            (marks,) = map_markers([obj], {role: _own(obj, name) for role, name in groups_of_markers(chosen).items()})
         subdivision = reading.subdivision if chosen.use_subdivision else None
         job = UnwrapJob.of(reading, subdivision, avoid, marks)
         with complaints(objects=[obj]):
@@ -181,12 +181,12 @@ def _own(obj: bpy.types.Object, name: str) -> str:
 def _check_groups(context: bpy.types.Context, objects: list) -> None:
     """Complain of a vertex group in the settings of Unwrap that none of the objects has."""
     from ...blender.vertex_groups import avoided
-    from ..unwrap import MARKERS
+    from ..unwrap import groups_of_markers, kept_free
 
     chosen = context.window_manager.operator_properties_last(UNWRAP)
     with complaints():
-        for name in ("keep_free", *MARKERS.values()):
-            avoided(objects, getattr(chosen, name))
+        for name in (kept_free(chosen), *groups_of_markers(chosen).values()):
+            avoided(objects, name)
 
 
 def _write(obj: bpy.types.Object, layout) -> list[str]:

@@ -45,6 +45,24 @@ def test_other_files_get_the_positions(run, package, ball):
     assert 0.19 < max(obj.data.vertices, key=lambda v: v.co.z).co.x < 0.5
 
 
+@pytest.mark.parametrize("suffix", [".blend", ".obj", ".ply", ".stl", ".glb", ".fbx"])
+def test_a_wall_goes_along_into_the_file_and_stays_as_it_is(run, package, ball, suffix):
+    V, F = icosphere(1)
+    scenes.add(V * 2.0, F, "Wall")
+    bpy.ops.wm.save_as_mainfile(filepath=str(ball / "in.blend"))
+    out = ball / f"out{suffix}"
+    status, _, err = run("flow", ball / "in.blend", "-o", out, "--handles", ball / "h.json", "--inside", "Wall")
+    assert status == 0, err
+    scenes.open_empty()
+    found = package("files.meshes").load(out)
+    places = np.array([obj.matrix_world @ v.co for obj in found for v in obj.data.vertices])
+    # Corners of the wall, and the tip, which is not where it was.
+    radius = np.linalg.norm(places, axis=1)
+    assert len({tuple(at) for at in places[radius > 1.9].round(3)}) == len(V)
+    np.testing.assert_allclose(radius[radius > 1.9], 2, atol=1e-5)
+    assert radius[radius < 1.9].max() == pytest.approx(1.4, abs=1e-4)
+
+
 def test_what_makes_no_sense_is_refused(run, ball):
     words = ["flow", ball / "in.blend", "-o", ball / "out.obj", "--handles", ball / "h.json"]
     for more, code, text in [

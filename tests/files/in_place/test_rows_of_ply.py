@@ -1,5 +1,5 @@
 """Rows of a .ply whose UVs stay keep every byte, whatever kind of numbers its UVs are, in which order its elements are,
-and whether its last line ends."""
+whether its last line ends, and how; so do those of vertices that no face has."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from mesh_bytes import imported
 
 from omt_uv.files.in_place import ply
 
-PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 2, 0]], np.float32)
 # Of these single precision has none.
-UVS = [(0.1, 0.2), (0.9, 0.3), (1 / 3, 0.7), (0.123456789012, 0.6)]
+UVS = [(0.1, 0.2), (0.9, 0.3), (1 / 3, 0.7), (0.123456789012, 0.6), (0.7, 0.45)]
 FACE = [[0, 1, 2, 3]]
 FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
 def file_of(form: str, kind: str, faces_first: bool, end: str, ends: bool) -> bytes:
-    """A square; `ends`: whether the last line of a text ends."""
-    vertex = ["element vertex 4", *(f"property float {a}" for a in "xyz"), *(f"property {kind} {a}" for a in "st")]
+    """A square beside a vertex of no face; `ends`: whether the last line of a text ends."""
+    vertex = [
+        f"element vertex {len(PLACES)}",
+        *(f"property float {a}" for a in "xyz"),
+        *(f"property {kind} {a}" for a in "st"),
+    ]
     face = ["element face 1", "property list uchar int vertex_indices"]
     parts = [face, vertex] if faces_first else [vertex, face]
     head = ["ply", f"format {form} 1.0", *parts[0], *parts[1], "end_header"]
@@ -48,7 +52,7 @@ def test_only_vertices_whose_uvs_change_have_other_bytes(moved, form, kind, face
     new, told = ply.put(data, [imported(FACE, wished, PLACES)])
     assert told == [] and (ply.read_uv(new)[1].astype(np.float32) == wished).all()
     old_rows, rows = (ply.read(d).rows["vertex"].start for d in (data, new))
-    for k in range(4):
+    for k in range(len(PLACES)):
         before, after = data[old_rows[k] : old_rows[k + 1]], new[rows[k] : rows[k + 1]]
         # A last line that has no end gets one.
         assert (before.rstrip(b"\n") if not FORMS[form] else before) == (
@@ -74,5 +78,22 @@ def test_a_vertex_that_is_split_stands_behind_all_others_also_where_the_last_lin
     wished = np.random.default_rng(3).random((6, 2)).astype(np.float32)
     new, _ = ply.put(data, [imported([[0, 1, 2], [0, 2, 3]], wished, PLACES)])
     mesh, uv = ply.read_uv(new)
-    assert len(mesh.positions) == 6 and (uv.astype(np.float32) == wished).all()
+    assert len(mesh.positions) == len(PLACES) + 2 and (uv.astype(np.float32) == wished).all()
     assert (mesh.positions[mesh.corner_vertex] == PLACES[[0, 1, 2, 0, 2, 3]]).all()
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("ends", [True, False])
+@pytest.mark.parametrize("faces_first", [False, True])
+@pytest.mark.parametrize("has_uvs", [True, False])
+@pytest.mark.parametrize("form", FORMS)
+def test_every_line_ends_as_the_others_do(form, has_uvs, faces_first, ends, end):
+    data = file_of(form, "float", faces_first, end, ends or bool(FORMS[form]))
+    if not has_uvs:
+        data = data.replace(b"float s", b"float other").replace(b"float t", b"float more")
+    wished = np.random.default_rng(5).random((4, 2)).astype(np.float32)
+    new, _ = ply.put(data, [imported(FACE, wished, PLACES)])
+    text = new[: ply.read(new).header.size] if FORMS[form] else new
+    lines = text.splitlines(keepends=True)
+    assert {line[len(line.rstrip(b"\r\n")) :] for line in lines[:-1]} == {end.encode()}
+    assert lines[-1].rstrip(b"\r\n") and lines[-1][len(lines[-1].rstrip(b"\r\n")) :] in (b"", end.encode())
