@@ -85,6 +85,20 @@ def test_distances_are_a_table_and_classes_those_of_neighbours(
         assert len(said) == 1
 
 
+def test_neighbours_are_those_by_distances_from_which_no_floor_was_taken_off(
+    distances, package, tmp_path, monkeypatch, capsys
+):
+    """Below it all shapes are alike, and the first ones would be everybody's neighbours."""
+    raw = np.array([[0, 9.0, 1], [9, 0, 2], [1, 2, 0]])
+    monkeypatch.setattr(package("pipelines.shapes.signature_index"), "read_index", lambda path: Index())
+    monkeypatch.setattr(distances, "_matrix", lambda options, index: np.stack([np.zeros((3, 3)), raw]))
+    monkeypatch.setattr(distances, "_draw", lambda *given: None)
+    labels = tmp_path / "labels.csv"
+    labels.write_text("".join(f"{n},{c}\n" for n, c in zip(NAMES, "xyx", strict=True)))
+    distances.run(asked(tmp_path, knn=1, labels=labels))
+    assert capsys.readouterr().out.splitlines()[1].startswith("66.7 % of the classes")
+
+
 @pytest.mark.parametrize(("count", "jobs", "scheduler"), [(3, 0, None), (3, 2, None), (3, 0, "tcp"), (9, 0, None)])
 def test_few_distances_are_found_here_and_many_by_a_batch(
     distances, package, tmp_path, monkeypatch, count, jobs, scheduler

@@ -200,11 +200,17 @@ def test_a_group_that_none_of_the_objects_has_is_named_before_anything_is_begun(
     queue = package("operators.arranging.queue")
     chosen = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
     setattr(chosen, setting, "mine")
+    # Where outlines are free, neither a centre nor corners count.
+    chosen.boundary = "DISK"
     try:
         if there:
             queue._check_groups(bpy.context, objects)
         else:
             with pytest.raises(package("operators.base").Complaint, match="no vertex group 'mine'"):
                 queue._check_groups(bpy.context, objects)
+            if setting in ("centre_group", "corner_group"):
+                chosen.boundary = "FREE"
+                queue._check_groups(bpy.context, objects)
     finally:
         chosen.property_unset(setting)
+        chosen.property_unset("boundary")
