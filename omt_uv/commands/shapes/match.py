@@ -140,7 +140,8 @@ def _match(options: argparse.Namespace, source, target):
     with refusals(name=f"{source[3]}, {target[3]}"):
         result = drain_shown((wrap_surfaces if options.wrap else match_surfaces)(job))
         attributes = None if options.wrap else transferred(job, result, source[1].attributes)
-    told = [*source[1].warnings, *target[1].warnings, *result.warnings]
+    told = [f"{name}: {text}" for _, carried, _, name in (source, target) for text in carried.warnings]
+    told += result.warnings
     return result, attributes, told
 
 

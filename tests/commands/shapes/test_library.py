@@ -96,6 +96,10 @@ def test_markers_compare_faces_as_they_lie(run, tmp_path):
     ]
     assert told[0]["raw"] == told[1]["raw"] > 0.1
     assert "no vertex group 'X'" in run("distance", one, other, "--markers", "X,Q")[2]
+    # A number among names is a name.
+    for words, name in (("84,Q", "84"), ("P,86", "86")):
+        status, _, err = run("distance", one, other, "--markers", words)
+        assert status == 1 and f"no vertex group '{name}'" in err and len(err.splitlines()) == 1, err
     assert "no vertex 999" in run("distance", one, other, "--markers", "84,999")[2]
     around = run("distance", one, other, "--points", 100, "--markers", "84,86", "--json")[1]
     assert json.loads(around)["raw"] > 0.05 and json.loads(around)["raw"] != told[0]["raw"]

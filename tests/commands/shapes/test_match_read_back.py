@@ -13,9 +13,9 @@ import scenes
 from sphere_shapes import blob
 
 
-def body(name, seed, corners):
+def body(name, seed, corners, subdivisions=2):
     """A body, and its vertices at the ends of the axes, as landmarks of one order on each body."""
-    V, F = blob(2, seed=seed)
+    V, F = blob(subdivisions, seed=seed)
     V = V * [1.0, 1.3, 0.8]
     obj = scenes.add(V, F, name)
     for k in range(corners):
@@ -137,3 +137,37 @@ def test_faces_that_reach_across_a_seam_are_told_of(package, run, tmp_path, monk
     first, *told = json.loads((tmp_path / "r.json").read_text())["warnings"]
     who = {0: [], 1: ["A face reaches across a seam"], 4: ["4 faces reach across a seam"]}[across]
     assert first == "one" and [text.partition(";")[0] for text in told] == who and all(text in err for text in told)
+
+
+@pytest.mark.parametrize("how", ["transfer", "wrap", "operator"])
+def test_faces_that_are_turned_over_for_a_match_are_those_of_the_object_that_is_named(run, capfd, tmp_path, how):
+    names = ("Source", "Target")
+    for k, name in enumerate(names):
+        scenes.open_empty() if how != "operator" else None
+        obj = body(name, k, 4, 1)
+        for face in range(2 + k):
+            obj.data.polygons[face].flip()
+        obj.data.update()
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{name}.blend"))
+    if how == "operator":
+        scenes.select([bpy.data.objects[name] for name in names])
+        capfd.readouterr()
+        mode = {"mode": "CHECKER", "landmark_prefix": "LM_", "use_polish": False}
+        assert bpy.ops.object.omt_match(**mode) == {"FINISHED"}
+        lines = capfd.readouterr().out.splitlines()
+    else:
+        words = [
+            tmp_path / "Source.blend",
+            tmp_path / "Target.blend",
+            "-o",
+            tmp_path / "out.blend",
+            "--landmarks",
+            "LM_",
+        ]
+        status, _, err = run("match", *words, *(["--wrap"] if how == "wrap" else []))
+        assert status == 0, err
+        lines = err.splitlines()
+    told = [line.partition("arning: ")[2] for line in lines if "turned over for the match" in line]
+    assert len(told) == 2
+    for k, text in enumerate(told):
+        assert text.startswith(f"{names[k]}: {2 + k} faces look to another side"), told

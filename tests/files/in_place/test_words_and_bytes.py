@@ -270,6 +270,16 @@ def test_places_are_equal_where_positions_are_or_all_agree_but_for_an_offset():
     assert not imported._agree(ours * 1.0, near)
 
 
+@pytest.mark.parametrize(("place", "offset"), [(0, 0), (1e3, -1e3), (1e6, 0), (1e6, 512.3), (1e6, -7e5), (1e6, -1e6)])
+def test_positions_agree_wherever_they_are_in_the_world(place, offset):
+    """Single precision is that of the place, however small the mesh is."""
+    ours = place + np.random.default_rng(2).random((40, 3))
+    theirs = (ours + offset).astype(np.float32)
+    assert imported._agree(ours, theirs)
+    theirs[7, 1] += 9 * np.spacing(np.float32(place + 1))
+    assert not imported._agree(ours, theirs)
+
+
 def test_faces_are_found_again_by_their_vertices_in_their_order():
     ours, start = np.array([0, 1, 2, 2, 1, 3, 0, 1, 2, 4, 4, 1]), np.array([0, 3, 6, 9, 12])
     theirs, their_start = np.array([0, 1, 2, 0, 1, 2, 2, 1, 3]), np.array([0, 3, 6, 9])
