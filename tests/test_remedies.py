@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from omt_uv.remedies import ADVICE, REMEDIES, advise, explain
+from omt_uv.remedies import ACTIONS, ADVICE, REMEDIES, action_advised, action_for, advise, explain
 from omt_uv.solver import errors
 
 SOLVER = Path(__file__).resolve().parents[1] / "omt_uv" / "solver"
@@ -67,3 +67,19 @@ def test_warnings_advise_in_blenders_words():
     said = " ".join(p.read_text() for p in SOLVER.rglob("*.py"))
     for name in ("MERGE", "MERGING", "DISSOLVE", "TURN_OUTSIDE"):
         assert getattr(errors, name) in ADVICE and f"{{{name}}}" in said
+
+
+def named(words: str) -> set[str]:
+    """Actions whose label stands in what is told."""
+    return {action for action, label, _ in ACTIONS if label in words}
+
+
+def test_what_names_a_button_has_it():
+    """A warning or an error that tells to do what a button does comes with that button."""
+    for neutral, words in ADVICE.items():
+        assert named(words) <= {action_advised(f"2 vertices are odd; {neutral}")}, neutral
+    for kind, words in REMEDIES.items():
+        assert not named(words) or action_for(kind("A cause")) in named(words), kind
+    # Each of them is there for something.
+    actions = {action_advised(text) for text in ADVICE} | {action_for(kind("A cause")) for kind in REMEDIES}
+    assert {action for action, _, _ in ACTIONS} - {"APPLY_LEVEL", "CUT_FURTHER"} <= actions

@@ -186,7 +186,7 @@ def test_a_queue_ends_as_a_script_does_and_says_what_it_did(package, window):
     assert dict(package("session.last_run").state.summary.rows) == {"Done": "2 of 2", "Failed, selected": "0"}
 
 
-@pytest.mark.parametrize("how", ["ESC", "cancel", "gone"])
+@pytest.mark.parametrize("how", ["ESC", "cancel", "gone", "out of sight"])
 def test_a_queue_that_is_stopped_keeps_what_is_done(package, window, how):
     found = bodies_with_some_selected()
     before = all_of()
@@ -198,8 +198,12 @@ def test_a_queue_that_is_stopped_keeps_what_is_done(package, window, how):
     first = queue.state.jobs[0].name
     other = next(obj for obj in found if obj.name != first)
     name = other.name
-    if how == "gone":
-        bpy.data.objects.remove(other)
+    if how in ("gone", "out of sight"):
+        # Whether it is no more, or in no collection that the view layer has.
+        for collection in list(other.users_collection) if how != "gone" else ():
+            collection.objects.unlink(other)
+        if how == "gone":
+            bpy.data.objects.remove(other)
         bpy.context.view_layer.update()
         while operator.modal(window, event("TIMER")) == RUNNING:
             pass

@@ -23,6 +23,8 @@ RUNS: list[tuple[str, str, dict]] = [
     ("uv.omt_refine", "Closed Band", DRAFT),
     ("uv.omt_refine", "Band", {**DRAFT, "keep_boundary": True}),
     ("uv.omt_magnify", "Band", {**DRAFT, "weight_group": "region", "source": "UV", "factor": 1.5}),
+    ("uv.omt_magnify", "Closed",
+     {**DRAFT, "weight_group": "region", "source": "UV", "factor": 1.25, "further": "second=0.5"}),
     ("uv.omt_magnify", "Smooth", {**DRAFT, "weight_group": "region", "source": "MESH", "factor": 2.0}),
     ("uv.omt_sphere", "Closed", DRAFT),
     ("uv.omt_sphere", "Closed", {**DRAFT, "orientation": "GROUPS", "pole_group": "pole"}),

@@ -187,3 +187,20 @@ def test_all_objects_that_new_ones_stand_in_for_are_hidden_or_none(hide, sharers
     assert set(bpy.context.selected_objects) == set(new)
     # Each knows the one that it stands in for.
     assert {obj.name: obj["omt_uv_source"].name for obj in new} == {f"{obj.name}_remesh": obj.name for obj in objects}
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+def test_uvs_of_a_new_mesh_are_looked_at_once_for_all_that_have_it(package, monkeypatch, levels):
+    objects, looked = [body("A", 0), body("B", 1)], []
+    for _ in range(2):
+        twin = objects[0].copy()
+        bpy.context.collection.objects.link(twin)
+        objects.append(twin)
+    scenes.select(objects)
+    module = package("blender.remesh_objects")
+    monkeypatch.setattr(module, "carried_gate", lambda obj, made: looked.append((obj.name, list(made))) or [])
+    assert bpy.ops.object.omt_remesh(target_vertices=40, levels=levels) == {"FINISHED"}
+    assert len(looked) == 2
+    for _, made in looked:
+        meshes = [bpy.data.objects[name].data for name in made]
+        assert len(set(meshes)) == len(meshes) == levels

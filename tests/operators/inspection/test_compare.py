@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+import pytest
 import scenes
 
 
@@ -43,6 +44,23 @@ def test_levels_stand_in_a_collection_and_are_shown_in_turn():
         # What is worked on next is what is seen.
         assert [obj.name for obj in bpy.context.view_layer.objects if obj.select_get()] == [name]
     assert seen == ["Bump_LOD1", "Bump_LOD2", "Bump", "Bump_LOD0"]
+
+
+@pytest.mark.parametrize("away", range(4))
+def test_what_is_in_no_collection_of_the_view_layer_is_left_out(away):
+    scenes.bump()
+    bpy.ops.object.omt_remesh(target_vertices=80, levels=3)
+    names = ["Bump_LOD0", "Bump_LOD1", "Bump_LOD2", "Bump"]
+    obj = bpy.data.objects[names[away]]
+    for collection in list(obj.users_collection):
+        collection.objects.unlink(obj)
+    there = [name for name in names if name != obj.name]
+    bpy.context.view_layer.objects.active = bpy.data.objects[there[0]]
+    seen = []
+    for _ in range(4):
+        assert bpy.ops.object.omt_compare() == {"FINISHED"}
+        seen += shown()
+    assert seen == [*there[1:], *there[:2]]
 
 
 def test_nothing_to_compare_with_is_said():
