@@ -82,12 +82,14 @@ def test_marks_go_along_exactly_where_all_of_them_are_on_lines(seed):
     np.testing.assert_array_equal(found.marks.edges, edges)
 
 
-def test_uv_seams_are_where_any_map_jumps():
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_uv_seams_are_where_any_map_jumps_however_large_it_is(size):
     V, F = meshes.grid(2, 3)
     surface, uv = triangle_surface(V, F), V[F.ravel(), :2]
     right = np.repeat(V[F, 0].mean(axis=1) > 0.5, 3)
-    cut = Layer("cut", "CORNER", "FLOAT2", uv + 5 * right[:, None])
-    whole = Layer("whole", "CORNER", "FLOAT2", uv)
+    rounding = 1e-8 * np.random.default_rng(1).random(uv.shape)
+    cut = Layer("cut", "CORNER", "FLOAT2", size * (uv + rounding + 5 * right[:, None]))
+    whole = Layer("whole", "CORNER", "FLOAT2", size * (uv + rounding))
     colour = Layer("colour", "CORNER", "FLOAT_COLOR", np.random.default_rng(0).random((len(uv), 4)))
     assert is_uv(cut) and not is_uv(colour)
     assert len(uv_seams(carried(F, layers=[whole, colour]), surface)) == 0
