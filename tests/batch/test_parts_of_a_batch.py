@@ -223,6 +223,28 @@ def test_a_run_that_cannot_begin_is_one_that_failed(monkeypatch, tmp_path):
     assert killed == [other] and mine._children == {other}
 
 
+@pytest.mark.parametrize("status", [0, 1, 3])
+def test_a_run_that_is_done_leaves_results_and_one_that_is_not_a_message(tmp_path, status):
+    task = task_of(tmp_path)
+    task = replace(task, output=tmp_path / "out" / "a b.obj")
+    task.path.parent.mkdir(parents=True, exist_ok=True)
+    task.path.write_bytes(b"mesh")
+
+    def watched(errand):
+        words = list(errand.words)
+        for option, text in (("--report", "{}"), ("--preview", "png"), ("-o", "result")):
+            Path(words[words.index(option) + 1]).write_text(text)
+        said = "omt_uv: warning: rounded\n" + ("omt_uv: error: cut off\n" if status else "")
+        return Outcome(status, "", "", said, 1.5, 1.0, 10)
+
+    made = child.run_task(replace(PLAN, output=tmp_path / "out"), task, ("program",), watched)
+    assert made.status == status and made.warnings == ["rounded"] and (made.seconds, made.memory) == (1.5, 10)
+    assert made.message == ("cut off" if status else "")
+    found = (made.report, list(made.outputs), bool(made.preview))
+    assert found == (("", [], False) if status else ("{}", [str(task.output)], True))
+    assert made.input_hash == plan.hash_of(task.path) and str(task.path) in " ".join(made.words)
+
+
 @pytest.mark.parametrize("err, text, expected", [
     ("", "", "status 3, without a word"),
     ("one\n\ntwo\n  \n", "", "two"),

@@ -94,6 +94,24 @@ def test_a_file_of_several_objects_holds_what_files_of_each_hold(package, tmp_pa
         assert alone == faces_of(objects)
 
 
+@pytest.mark.parametrize("bare", range(4))
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_file_of_objects_of_which_some_have_no_uvs_holds_them_all(package, tmp_path, suffix, bare):
+    objects, path = patches(), tmp_path / f"made{suffix}"
+    for obj in objects[:bare]:
+        obj.data.uv_layers.remove(obj.data.uv_layers[0])
+    package("files.export").export(path, suffix, objects, False)
+    package("files.read_back").check(path, suffix, objects)
+    if suffix in (".stl", ".ply"):
+        return
+    # Without those of one it is another file.
+    mapped = next((obj for obj in objects if not obj.data.uv_layers), None)
+    if mapped is not None:
+        mapped.data.uv_layers.new(name="more")
+        with pytest.raises(package("files.verified").FileError, match="uv corners"):
+            package("files.read_back").check(path, suffix, objects)
+
+
 @pytest.mark.parametrize("first", [(0, 0, 1, 1), (1, 1, 0, 0)], ids=str)
 def test_an_object_without_materials_gets_none_of_the_one_before(package, tmp_path, first):
     """Faces of the first in the order of their materials, and in another one."""

@@ -38,6 +38,26 @@ def test_by_hand(package):
     assert figures.charts == 2
 
 
+@pytest.mark.parametrize("wrong", ["", "Area error", "Shear", "Folded faces", "Overlap"])
+def test_what_is_measured_is_marked_where_it_is_out_of_its_bounds(package, wrong):
+    """A row of quads, evenly and as it lies; one of them is larger, all are longer, one is folded, or on another."""
+    points = [(x, y, 0) for y in range(2) for x in range(21)]
+    scenes.add(points, [(k, k + 1, k + 22, k + 21) for k in range(20)])
+    obj = bpy.context.object
+    uv = 0.04 * scenes.seen_from_above(obj) / np.ptp(scenes.seen_from_above(obj), axis=0).max() * 20
+    uv = {"Area error": np.where(uv[:, :1] > 0.5, 0.5 + 3 * (uv - 0.5), uv), "Shear": uv * [1, 8]}.get(wrong, uv)
+    if wrong == "Overlap":
+        uv[-4:] = uv[:4]
+    elif wrong == "Folded faces":
+        # Its far side is on the near one's other side.
+        uv[-3:-1] = uv[-4:][[0, 3]] - (uv[-3:-1] - uv[-4:][[0, 3]])
+    scenes.set_uv(obj, uv)
+    assert bpy.ops.uv.omt_measure() == {"FINISHED"}
+    summary = package("session.last_run").state.summary
+    assert {"Area error", "Shear", "Folded faces", "Overlap"} <= {name for name, _ in summary.rows}
+    assert wrong in summary.beyond if wrong else not summary.beyond, (dict(summary.rows), summary.beyond)
+
+
 def test_operator_reports_the_figures(package, capfd):
     obj = scenes.bump()
     bpy.ops.uv.omt_unwrap()
