@@ -101,6 +101,11 @@ def test_linked_meshes_are_refused_by_name_by_every_operator_that_writes(package
         obj = obj.override_create(remap_local_usages=True)
         obj.data.override_create(remap_local_usages=True)
     before = scenes.uv_of(obj).copy()
+    # Before it comes one that could be written to.
+    near = scenes.bump(name="A near one", offset=5.0)
+    near.vertex_groups.new(name="region").add(list(range(9)), 1.0, "REPLACE")
+    scenes.set_uv(near, scenes.seen_from_above(near))
+    kept = scenes.state(near)
     names = {cls.bl_idname for *_, cls in operators(package)}
     assert names > READ_ONLY | OTHERS | PAIRS
     for name in sorted(names - OTHERS - PAIRS):
@@ -117,3 +122,7 @@ def test_linked_meshes_are_refused_by_name_by_every_operator_that_writes(package
             run()
         assert (scenes.uv_of(obj) == before).all() and not any(edge.use_seam for edge in obj.data.edges), name
         assert not obj.data.color_attributes and len(obj.vertex_groups) == 1, name
+        near.select_set(True)
+        with pytest.raises(RuntimeError, match=r"^Error: Far is (linked from|a library)"):
+            run()
+        assert scenes.state(near) == kept and len(near.vertex_groups) == 1, name

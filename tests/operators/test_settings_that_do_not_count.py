@@ -29,7 +29,6 @@ RUNS: list[tuple[str, str, dict]] = [
     ("uv.omt_seams", "Band", {"max_shear": 1.25}),
     ("object.omt_remesh", "Band", {"target_vertices": 40}),
     ("object.omt_match", "Wall Closed", {"mode": "WRAP"}),
-    ("object.omt_match", "Wall Closed", {"mode": "CHECKER"}),
     ("object.omt_flow", "Closed", {"move": (0.0, 0.0, 0.25), "path": "STRAIGHT", "result": "MESH"}),
     *(("object.omt_volume", "Closed", {"tets": 100, "result": result})
       for result in ("TETS", "SHELLS", "POINTS", "SLICE", "ATTRIBUTE")),

@@ -189,9 +189,8 @@ def test_all_objects_that_new_ones_stand_in_for_are_hidden_or_none(hide, sharers
     assert {obj.name: obj["omt_uv_source"].name for obj in new} == {f"{obj.name}_remesh": obj.name for obj in objects}
 
 
-@pytest.mark.parametrize("levels", [1, 2])
-def test_uvs_of_a_new_mesh_are_looked_at_once_for_all_that_have_it(package, monkeypatch, levels):
-    objects, looked = [body("A", 0), body("B", 1)], []
+def test_uvs_of_a_new_mesh_are_looked_at_once_for_all_that_have_it(package, monkeypatch):
+    objects, looked, levels = [body("A", 0), body("B", 1)], [], 2
     for _ in range(2):
         twin = objects[0].copy()
         bpy.context.collection.objects.link(twin)

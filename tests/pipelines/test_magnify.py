@@ -178,6 +178,10 @@ def test_the_box_of_regions_is_that_of_their_faces_in_the_old_uvs():
     assert box_of([nothing]) is None and np.allclose(box_of([nothing, one]), box_of([one]))
     other = region(V, F, inside.astype(float), V[:, :2] + [4, 1], "face")
     assert np.allclose(box_of([one, other]), [(2.2, 1.3), (4.5, 2.6)], atol=1e-6)
+    for axis in (0, 1):
+        line = V[:, :2].copy()
+        line[:, axis] = 0.25
+        assert box_of([region(V, F, inside.astype(float), line, "face")]) is None
 
 
 def test_polygons_at_the_end_without_triangles_hold_up_no_area(monkeypatch):

@@ -46,11 +46,11 @@ def test_levels_stand_in_a_collection_and_are_shown_in_turn():
     assert seen == ["Bump_LOD1", "Bump_LOD2", "Bump", "Bump_LOD0"]
 
 
-@pytest.mark.parametrize("away", range(4))
+@pytest.mark.parametrize("away", [0, 2])
 def test_what_is_in_no_collection_of_the_view_layer_is_left_out(away):
     scenes.bump()
-    bpy.ops.object.omt_remesh(target_vertices=80, levels=3)
-    names = ["Bump_LOD0", "Bump_LOD1", "Bump_LOD2", "Bump"]
+    bpy.ops.object.omt_remesh(target_vertices=40, levels=2)
+    names = ["Bump_LOD0", "Bump_LOD1", "Bump"]
     obj = bpy.data.objects[names[away]]
     for collection in list(obj.users_collection):
         collection.objects.unlink(obj)
@@ -60,7 +60,7 @@ def test_what_is_in_no_collection_of_the_view_layer_is_left_out(away):
     for _ in range(4):
         assert bpy.ops.object.omt_compare() == {"FINISHED"}
         seen += shown()
-    assert seen == [*there[1:], *there[:2]]
+    assert seen == [there[1], there[0]] * 2
 
 
 def test_nothing_to_compare_with_is_said():

@@ -11,10 +11,12 @@ from sphere_shapes import random_rotation
 
 from omt_uv.display.histogram import histogram, thumbnail
 from omt_uv.pipelines.distortion import measure_readings
+from omt_uv.pipelines.measuring.per_face import face_values
 from omt_uv.pipelines.measuring.region_figures import figures_by_region
 from omt_uv.pipelines.reading import Reading
 from omt_uv.pipelines.texel_density import Texels, texel_density
 from omt_uv.solver.comparison.triangle_shapes import compare_shapes
+from omt_uv.solver.maps.distortion import RATIO_FLOOR
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.strain.beltrami import beltrami
 from omt_uv.solver.strain.regions import region_strain
@@ -115,3 +117,20 @@ def test_figures_stay_whatever_the_faces(change, figures):
             continue
         factor = 10.0 ** UNITS.get(name, 0) if change is larger else 2.0 if change is doubled and name in SUMS else 1.0
         assert after[key] == pytest.approx(value * factor, rel=2e-5), key
+
+
+@pytest.mark.parametrize("kind", ["without area", "folded"])
+def test_faces_that_have_no_area_in_the_map_have_the_least_value_there_is(kind):
+    V, F, uv, _ = bent()
+    corner_uv = uv[F].copy()
+    plain = face_values(Reading(triangle_surface(V, F), np.ones(len(F), bool), corner_uv.reshape(-1, 2), None))
+    if kind == "folded":
+        # Its last vertex goes to the other side of the opposite edge, and with it that corner of all around.
+        moved = uv.copy()
+        moved[F[4, 2]] = corner_uv[4, :2].sum(axis=0) - corner_uv[4, 2]
+        corner_uv = moved[F]
+    else:
+        corner_uv[4, 2] = corner_uv[4, 0]
+    found = face_values(Reading(triangle_surface(V, F), np.ones(len(F), bool), corner_uv.reshape(-1, 2), None))
+    assert found.area[4] == pytest.approx(np.log2(RATIO_FLOOR)) and found.area[4] < plain.area.min() - 1
+    assert np.isfinite(found.shear).all() and np.isfinite(found.stretch).all()
