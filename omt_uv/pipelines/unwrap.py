@@ -17,8 +17,8 @@ from ..solver.errors import DISSOLVE, MERGING, MeshError, plural
 from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import face_areas, signed_areas, turned_by
-from ..solver.mesh.repair import FlatTriangles, flat_triangles, joined_vertices
-from ..solver.mesh.surface import side_ends, turned_surface, with_joined_vertices
+from ..solver.mesh.repair import flat_triangles, joined_vertices
+from ..solver.mesh.surface import FlatTriangles, side_ends, turned_surface, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
 from ..solver.parameterization.chart_indices import CornerPins
 from ..solver.parameterization.options import UnwrapOptions
@@ -60,7 +60,7 @@ def lay_out(
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
     as_they_stand, jobs = jobs, [_set_up(job) for job in jobs]
-    whole, (jobs, flat, warnings) = jobs, _without_flat(jobs)
+    whole, (jobs, flat, warnings) = jobs, _without_flat(jobs, settings.seams)
     given, (jobs, more) = jobs, _prepared(jobs, settings.seams)
     warnings += more
     share = PACKING_FROM / len(jobs)
@@ -215,13 +215,14 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
 
 
 def _without_flat(
-    jobs: Sequence[UnwrapJob],
+    jobs: Sequence[UnwrapJob], seams: str
 ) -> tuple[list[UnwrapJob], list[FlatTriangles], list[tuple[int, str]]]:
     """The jobs without triangles that would tear their maps and lie on others anyway, these triangles of each, and
     warnings."""
     rest, flat, warnings = [], [], []
     for index, job in enumerate(jobs):
-        found = flat_triangles(job.surface, job.chosen)
+        is_joined = seams == "auto" and job.subdivision is None
+        found = flat_triangles(job.surface, job.chosen, job.was_split if is_joined else None)
         flat.append(found)
         if count := len(found.polygons):
             who = plural(count, "A triangle", "{} triangles")

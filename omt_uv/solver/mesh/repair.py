@@ -16,7 +16,15 @@ from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
 from .geometry import cross3, edge_lengths, extents, lengths, places
 from .gluing import Gluing, corner_classes, polygon_gluing
-from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam, side_ends
+from .surface import (
+    FlatTriangles,
+    Surface,
+    degenerate_triangles,
+    duplicate_faces,
+    is_seam,
+    side_ends,
+    used_twice,
+)
 from .topology import (
     expand,
     first_of,
@@ -206,39 +214,40 @@ def _healed(gluing: Gluing) -> Gluing:
     )
 
 
-@dataclass(frozen=True)
-class FlatTriangles:
-    """Triangles that lie on an edge or a vertex of other polygons: these polygons (t,), their corners (3t,), and the
-    corner (3t,) of another polygon at the same place as each."""
-
-    polygons: np.ndarray
-    corners: np.ndarray
-    hosts: np.ndarray
-
-    def carried(self, corners: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (k,), ascending, with UVs (k,2), and those of these triangles, with the UVs of their hosts."""
-        at = np.searchsorted(corners, self.hosts)
-        there = np.isin(self.hosts, corners)
-        every = np.concatenate([corners, self.corners[there]])
-        order = np.argsort(every, kind="stable")
-        return every[order], np.concatenate([uv, uv[at[there]]])[order]
-
-
-def flat_triangles(surface: Surface, faces: np.ndarray) -> FlatTriangles:
+def flat_triangles(surface: Surface, faces: np.ndarray, was_split: bool | None = None) -> FlatTriangles:
     """Triangles of the polygons `faces` (f,) bool with two corners at one place that would tear a map: with a vertex
-    used twice, or an open side. Without them their neighbours meet. What lies on no other polygon is none of them."""
+    used twice, or an open side. Without them their neighbours meet. What lies on no other polygon is none of them.
+
+    was_split : see `joined_vertices`, where that follows; one that keeps it from joining what is around it goes, too
+    """
     vertex, after, size = surface.corner_vertex, next_corners(surface.face_start), np.diff(surface.face_start)
     tail, head = surface.positions[vertex], surface.positions[vertex[after]]
     owner = np.repeat(np.arange(len(faces)), size)
     short = np.flatnonzero((tail == head).all(axis=1) & (faces & (size == 3))[owner])
-    found = np.zeros(len(faces), dtype=bool)
-    found[owner[short]] = True
-    none = np.zeros(0, np.int64)
     if not len(short):
-        return FlatTriangles(none, none, none)
+        return FlatTriangles(short, short, short)
+    torn = np.zeros(len(faces), dtype=bool)
+    while True:
+        found = _torn_triangles(surface, faces, short, torn)
+        if was_split is None:
+            return found
+        rest = faces.copy()
+        rest[found.polygons] = False
+        more = owner[used_twice(surface, rest, _along_sides(surface, rest, was_split))]
+        more = np.intersect1d(more, owner[short])
+        if torn[more].all():
+            return found
+        torn[more] = True
+
+
+def _torn_triangles(surface: Surface, faces: np.ndarray, short: np.ndarray, also: np.ndarray) -> FlatTriangles:
+    """Those of triangles with short sides, from the corners (k,) on, that tear a map, or go `also` (f,) bool."""
+    vertex, after = surface.corner_vertex, next_corners(surface.face_start)
+    owner = np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
+    found, torn = np.zeros(len(faces), dtype=bool), also.copy()
+    found[owner[short]] = True
     chosen, place = np.flatnonzero(faces[owner]), places(surface.positions)[vertex]
     open_ = chosen[only_once(pair_keys(vertex[chosen], vertex[after[chosen]]))]
-    torn = np.zeros(len(faces), dtype=bool)
     in_point = np.bincount(owner[short], minlength=len(faces)) == 3
     torn[owner[open_[(place[open_] != place[after[open_]]) | in_point[owner[open_]]]]] = True
     torn[owner[short[vertex[short] == vertex[after[short]]]]] = True
@@ -412,6 +421,14 @@ def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False
     and neither of which is a seam. A part that touches itself was meant to be open there, unless a file format has no
     other way to say where its UVs part, was_split.
     """
+    label = _along_sides(surface, faces, was_split)
+    # No polygon shall have one vertex twice.
+    spoilt = np.isin(label, label[surface.corner_vertex[used_twice(surface, faces, label)]])
+    return np.where(spoilt, np.arange(len(label)), first_of(label))
+
+
+def _along_sides(surface: Surface, faces: np.ndarray, was_split: bool) -> np.ndarray:
+    """A number (n,) for every vertex, the same where `joined_vertices` joins sides."""
     n, owner = len(surface.positions), np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
     ends, chosen = side_ends(surface), np.flatnonzero(faces[owner])
     key = pair_keys(*ends[:, chosen])
@@ -420,8 +437,7 @@ def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False
     # Most meshes are whole, or open in few places.
     border = np.zeros(len(faces), dtype=bool)
     border[owner[side]] = True
-    corners = surface.corner_vertex[border[owner]]
-    place, used = np.full(n, -1), np.unique(corners)
+    place, used = np.full(n, -1), np.unique(surface.corner_vertex[border[owner]])
     place[used] = places(surface.positions[used])
     doubles = duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), border)
     twin = _twins(doubles, len(faces))
@@ -431,8 +447,4 @@ def joined_vertices(surface: Surface, faces: np.ndarray, was_split: bool = False
         return np.arange(n)
     part = graph_components(ends[0, chosen], ends[1, chosen], n)[1]
     apart = (part[first[0]] != part[second[0]]) | was_split
-    label = joined_along(n, first[:, apart], second[:, apart])
-    # No polygon shall have one vertex twice.
-    twice = row_labels(np.stack([owner[border[owner]], label[corners]], axis=1))
-    spoilt = np.isin(label, label[corners][np.bincount(twice)[twice] > 1])
-    return np.where(spoilt, np.arange(n), first_of(label))
+    return joined_along(n, first[:, apart], second[:, apart])

@@ -183,6 +183,24 @@ def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluin
     )
 
 
+@dataclass(frozen=True)
+class FlatTriangles:
+    """Triangles that lie on an edge or a vertex of other polygons: these polygons (t,), their corners (3t,), and the
+    corner (3t,) of another polygon at the same place as each."""
+
+    polygons: np.ndarray
+    corners: np.ndarray
+    hosts: np.ndarray
+
+    def carried(self, corners: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (k,), ascending, with UVs (k,2), and those of these triangles, with the UVs of their hosts."""
+        at = np.searchsorted(corners, self.hosts)
+        there = np.isin(self.hosts, corners)
+        every = np.concatenate([corners, self.corners[there]])
+        order = np.argsort(every, kind="stable")
+        return every[order], np.concatenate([uv, uv[at[there]]])[order]
+
+
 def side_ends(surface: Surface) -> np.ndarray:
     """The vertices (2,c) at both ends of the side of its polygon that begins at each corner."""
     return np.stack([surface.corner_vertex, surface.corner_vertex[next_corners(surface.face_start)]])
@@ -193,6 +211,15 @@ def with_joined_vertices(surface: Surface, same: np.ndarray) -> Surface:
     return replace(
         surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
     )
+
+
+def used_twice(surface: Surface, faces: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """The corners (k,) of the polygons `faces` (f,) bool that use a vertex of a label (n,) twice."""
+    owner = np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
+    joined = np.bincount(label, minlength=int(label.max(initial=0)) + 1)[label] > 1
+    corners = np.flatnonzero(faces[owner] & joined[surface.corner_vertex])
+    pairs = row_labels(np.stack([owner[corners], label[surface.corner_vertex[corners]]], axis=1))
+    return corners[np.bincount(pairs)[pairs] > 1]
 
 
 def turned_surface(surface: Surface, axes: np.ndarray) -> Surface:

@@ -8,10 +8,10 @@ from broken_meshes import broken_mesh
 from omt_uv.solver import errors
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
-from omt_uv.solver.mesh import repair
+from omt_uv.solver.mesh import repair, topology
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.gluing import corner_classes
-from omt_uv.solver.mesh.surface import Surface, degenerate_triangles, triangle_surface
+from omt_uv.solver.mesh.surface import FlatTriangles, Surface, degenerate_triangles, triangle_surface
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -536,12 +536,40 @@ def test_a_flat_triangle_that_joins_its_neighbours_stays():
     assert flat_of(torn).polygons.tolist() == [*flat, len(F)]
 
 
+def test_a_flat_triangle_goes_that_keeps_the_parts_at_its_places_from_being_joined():
+    """As where a modeller's file has rounded a seam away on one of its sides: both ends are one vertex of the other."""
+    V, F = meshes.grid(4, 2)
+    upper = V[F][:, :, 1].mean(axis=1) > V[:, 1].mean()
+    middle = np.flatnonzero(V[:, 1] == np.median(V[:, 1]))
+    a, b = middle[np.argsort(V[middle, 0])][1:3]
+    V[b] = V[a]
+    there = F[upper] + len(V)
+    there[there == b + len(V)] = a + len(V)
+    there = there[(there != np.roll(there, 1, axis=1)).all(axis=1)]
+    surface = triangle_surface(np.vstack([V, V]), np.vstack([F[~upper], there]))
+    every = np.ones(len(surface.triangles), bool)
+    assert len(repair.flat_triangles(surface, every).polygons) == 0
+    assert (joined(surface)[[a, b, a + len(V)]] == [a, b, a + len(V)]).all()
+    flat = repair.flat_triangles(surface, every, False)
+    assert (
+        flat.polygons.tolist() == np.flatnonzero((F[~upper] == a).any(axis=1) & (F[~upper] == b).any(axis=1)).tolist()
+    )
+    rest = every.copy()
+    rest[flat.polygons] = False
+    same = joined(surface, rest)
+    assert same[b] == same[a] == same[a + len(V)]
+    # What is left is one disk, with no side open but those of the outline.
+    triangles = same[surface.corner_vertex].reshape(-1, 3)[rest]
+    assert len(topology.boundary_edges(triangles)) == 12
+    assert len(topology.boundary_loops(triangles)) == 1
+
+
 def test_uvs_are_carried_from_the_corners_that_have_some():
-    flat = repair.FlatTriangles(np.array([1]), np.array([3, 4, 5]), np.array([7, 2, 9]))
+    flat = FlatTriangles(np.array([1]), np.array([3, 4, 5]), np.array([7, 2, 9]))
     corners, uv = flat.carried(np.array([0, 2, 7]), np.array([[0.0, 0], [0.2, 1], [0.7, 1]]))
     assert corners.tolist() == [0, 2, 3, 4, 7]
     assert uv.tolist() == [[0, 0], [0.2, 1], [0.7, 1], [0.2, 1], [0.7, 1]]
-    nothing = repair.FlatTriangles(*(np.zeros(0, np.int64) for _ in range(3)))
+    nothing = FlatTriangles(*(np.zeros(0, np.int64) for _ in range(3)))
     np.testing.assert_array_equal(nothing.carried(corners, uv)[0], corners)
 
 
