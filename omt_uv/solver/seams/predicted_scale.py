@@ -31,6 +31,8 @@ LEAST_AREA = 1e-3
 # Added to the diagonal of Green's functions, over itself and over its largest, against rounding.
 ROUNDING = 1e-8
 LEAST_ROUNDING = 1e-13
+# Of what was there before others were held, what is left is rounding below this share: dozens of the last digit.
+LEAST_PIVOT = 1e-14
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ class Held:
 
     def at(self, vertices: np.ndarray, own: np.ndarray | None = None) -> Held:
         """Held at the vertices (k,), too; own : see `between`."""
-        root = np.linalg.cholesky(self.between(vertices, own))
+        root, apart = _root(self.between(vertices, own), self.green[vertices, vertices].max())
+        vertices = vertices[apart]
         taken = self.green[vertices] - self.rows[:, vertices].T @ self.rows
         rows = solve_triangular(root, taken, lower=True)
         value = self.value - rows.T @ solve_triangular(root, self.value[vertices], lower=True)
@@ -151,6 +154,17 @@ class ScaleModel:
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""
         return self.plate.value[vertices] ** 2 / np.maximum(self.plate.own(vertices), 1e-300)
+
+
+def _root(block: np.ndarray, whole: float) -> tuple[np.ndarray, np.ndarray | slice]:
+    """A root (j,j) of Green's function (k,k) between vertices, and which (j,) of these it is of: all, or where rounding
+    of the whole, what was there before others were held, does not leave all told apart, those that it does."""
+    root, flaw = lapack.dpotrf(block, lower=1)
+    if flaw == 0 and np.square(root.diagonal()).min(initial=np.inf) > LEAST_PIVOT * whole:
+        return np.linalg.cholesky(block), slice(None)
+    # The freest first: where they are held, nothing is left at the others but rounding.
+    root, order, rank, _ = lapack.dpstrf(block, tol=LEAST_ROUNDING * whole, lower=1)
+    return np.tril(root[:rank, :rank]), order[:rank] - 1
 
 
 def prefix_energies(matrix: np.ndarray, load: np.ndarray) -> np.ndarray:

@@ -26,3 +26,18 @@ def test_what_is_held_one_after_another_is_held_at_once():
     np.testing.assert_allclose(after.value, once.value, atol=1e-10)
     np.testing.assert_allclose(after.own(np.arange(30)), once.own(np.arange(30)), atol=1e-9)
     assert np.abs(once.value[np.concatenate([first, then])]).max() < 1e-4
+
+
+def test_what_rounding_leaves_between_vertices_that_are_held_already_holds_nothing():
+    """As of a closed surface, whose Green's function is large and the same nearly everywhere."""
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(12, 12))
+    root[6:] = root[:6] + 1e-9 * root[6:]
+    held = Held.of(1e4 + root @ root.T, rng.normal(size=12))
+    first, again = held.at(np.arange(6)), np.arange(4, 12)
+    block = first.between(again, np.full(8, 1e-9))
+    assert np.linalg.eigvalsh(block)[0] < 0
+    after = first.at(again, np.full(8, 1e-9))
+    assert len(after.rows) < 6 + 8
+    assert np.abs(after.value).max() < 1e-6 * np.abs(held.value).max()
+    assert np.abs(after.own(np.arange(12))).max() < 1e-6
