@@ -50,7 +50,11 @@ class BoundaryBarrier:
     def energy(self, w: np.ndarray) -> float:
         """Sum over near pairs of strength * (reach / distance - 1)^2."""
         near = self._near(w)
-        return float(self.strength * ((near.reach / near.distance - 1) ** 2).sum()) if len(near.point) else 0.0
+        if not len(near.point):
+            return 0.0
+        # Infinite at contact: a step may end there.
+        with np.errstate(over="ignore"):
+            return float(self.strength * ((near.reach / near.distance - 1) ** 2).sum())
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Gradient (n,) complex; vertices and rows (k,3) of linear forms whose squares are the Hessian, made convex."""

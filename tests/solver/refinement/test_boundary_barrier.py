@@ -168,3 +168,10 @@ def test_a_smaller_reach_is_that_share_of_the_edges():
     np.testing.assert_allclose(far.vertex_reach, 10 * near.vertex_reach)
     np.testing.assert_allclose(far.edge_reach, 10 * near.edge_reach)
     assert near.energy(w) < far.energy(w)
+
+
+def test_energy_at_contact_is_infinite_without_a_word():
+    w = slit()
+    barrier = make_barrier(w, np.arange(len(w)), 1.0)
+    with np.errstate(over="raise"):
+        assert barrier.energy(w) == np.inf
