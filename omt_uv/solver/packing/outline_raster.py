@@ -16,6 +16,8 @@ from ..mesh.topology import boundary_edges, expand
 
 # Cells that rounding may take from what is near.
 ROUNDING = 1e-9
+# Cells of boxes that are found at once.
+MOST_CELLS = 2_000_000
 # What is lower is a row, and what is shorter a point.
 TINY = 1e-30
 
@@ -61,7 +63,8 @@ def outlines_of(points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -
 def grown_cells(outlines: Sequence[IslandOutline], growth: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """Cells (h,w) bool, rows upwards, that touch each island grown by `growth` cells, and the lower left of them (2,).
 
-    All at once: the cells of one box after another, row by row, with one cell more at the end of every row.
+    All at once, as far as memory is no matter: the cells of one box after another, row by row, with one cell more at
+    the end of every row.
     """
     if not len(outlines):
         return []
@@ -72,6 +75,9 @@ def grown_cells(outlines: Sequence[IslandOutline], growth: float) -> list[tuple[
     high = np.floor(np.maximum.reduceat(np.maximum(tail, head), first) + growth).astype(np.int64)
     size = high + 1 - low
     cells = (size[:, 0] + 1) * size[:, 1]
+    if cells.sum() > MOST_CELLS and len(outlines) > 1:
+        half = len(outlines) // 2
+        return grown_cells(outlines[:half], growth) + grown_cells(outlines[half:], growth)
     begin = np.cumsum(cells) - cells
     frame = _CellRows(begin[owner], size[owner], int(cells.sum()))
     moved = IslandOutline(tail - low[owner], head - low[owner])
@@ -134,10 +140,14 @@ class _CellRows:
             x = begin[:, 0] + along[:, 0] * np.clip([comes, leaves], 0, 1)
             left = np.where(is_there, np.minimum(left, x.min(axis=0)), left)
             right = np.where(is_there, np.maximum(right, x.max(axis=0)), right)
-        column, last = (np.clip(np.floor(x).astype(np.int64), 0, self.size[edge, 0] - 1) for x in (left, right))
-        begins = np.bincount(self._numbers(edge, row, column), minlength=self.count)
-        ends = np.bincount(self._numbers(edge, row, last + 1), minlength=self.count)
-        return np.cumsum(begins - ends)
+        # Rounding may have found a row that is out of reach.
+        there = left <= right
+        edge, row = edge[there], row[there]
+        ends = (np.floor(x[there]).astype(np.int64) for x in (left, right))
+        column, last = (np.clip(x, 0, self.size[edge, 0] - 1) for x in ends)
+        begun = np.bincount(self._numbers(edge, row, column), minlength=self.count)
+        ended = np.bincount(self._numbers(edge, row, last + 1), minlength=self.count)
+        return np.cumsum(begun - ended)
 
     def _numbers(self, edge: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
         """The cells in rows and columns of the boxes of segments."""

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.mesh.topology import boundary_edges
-from omt_uv.solver.packing.outline_raster import grown_cells, outlines_of
+from omt_uv.solver.packing import outline_raster
+from omt_uv.solver.packing.outline_raster import IslandOutline, grown_cells, outlines_of
 from omt_uv.solver.packing.placement import BESIDE, place, turned_masks
 from omt_uv.solver.packing.raster_grid import RasterGrid, rectangles_of
 from omt_uv.solver.packing.shelves import blocks_of
@@ -49,13 +50,26 @@ def test_cells_are_those_that_the_grown_island_touches(growth):
 
 
 @pytest.mark.parametrize("growth", [0.0, 1.5])
-def test_cells_of_several_islands_are_those_of_each(growth):
+@pytest.mark.parametrize("most", [300, 10**6])
+def test_cells_of_several_islands_are_those_of_each(growth, most, monkeypatch):
+    monkeypatch.setattr(outline_raster, "MOST_CELLS", most)
     several = [meshes.random_disk(count=30), meshes.grid(3, 2), meshes.random_disk(count=20)]
     outlines = outlines_of([V[:, :2] * 9 - 2.3 for V, _ in several], [F for _, F in several])
     for (cells, low), outline in zip(grown_cells(outlines, growth), outlines, strict=True):
         ((alone, corner),) = grown_cells([outline], growth)
         assert np.array_equal(cells, alone) and np.array_equal(low, corner)
     assert grown_cells([], growth) == []
+
+
+def test_a_row_that_rounding_puts_out_of_reach_has_no_cells():
+    growth, row = 1.1, 8
+    reach = growth + outline_raster.ROUNDING
+    height = np.nextafter(row - reach, 0)
+    assert np.floor(height + reach) == row and row - height > reach
+    line = IslandOutline(np.array([[5.0, height - 3]]), np.array([[9.0, height]]))
+    rows = outline_raster._CellRows(np.zeros(1, np.int64), np.array([[20, 50]]), 21 * 50)
+    near = rows.near(line, growth).reshape(50, 21)
+    assert near[row - 1].any() and not near[row].any()
 
 
 @pytest.mark.parametrize("seed", range(4))
