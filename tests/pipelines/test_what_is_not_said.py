@@ -29,6 +29,7 @@ OTHERWISE = {
     "mirrored": {"solver.arranging.stacks.stacks", "solver.seams.path_graph.path_graph"},
     "pressure": {"solver.refinement.continuation.StageLimits"},
     "sieve": {"solver.cutting.cuts.cut"},
+    "was_split": {"solver.mesh.repair.flat_triangles"},
 }
 
 

@@ -23,8 +23,8 @@ from omt_uv.solver.maps.tutte import arc_length_parameters, tutte
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.repair import _least_height
 from omt_uv.solver.mesh.topology import boundary_loops
-from omt_uv.solver.packing.placement import _beside, _extremes, _touch, turned_masks
-from omt_uv.solver.packing.raster_grid import RasterGrid
+from omt_uv.solver.packing.placement import _beside, turned_masks
+from omt_uv.solver.packing.raster_grid import FreePlaces, RasterGrid
 from omt_uv.solver.refinement.vertex_sweeps import WORST as WORST_STARS
 from omt_uv.solver.refinement.vertex_sweeps import Smoother
 
@@ -109,14 +109,15 @@ def test_what_touches_a_mask_is_counted_cell_by_cell_wherever_it_lies(quarters):
         for dx, dy in turned.beside.tolist():
             cx, cy = x + dx, y + dy
             count += not (0 <= cx < side and 0 <= cy < side) or bool(taken[cy, cx])
-        assert _touch(turned, x, y, grid) == pytest.approx(count / len(turned.beside))
+        share = grid.taken_share(turned.beside, np.array([[x, y]]))
+        assert share == pytest.approx(count / len(turned.beside))
 
 
 def test_places_at_the_ends_of_outermost_rows_and_columns():
     free = np.zeros((6, 7), bool)
     for y, x in ((1, 2), (1, 4), (3, 1), (4, 5), (4, 3), (2, 5)):
         free[y, x] = True
-    assert _extremes(free) == {(2, 1), (4, 1), (3, 4), (5, 4), (1, 3), (5, 2)}
+    assert FreePlaces(np.packbits(free, axis=1)).ends() == {(2, 1), (4, 1), (3, 4), (5, 4), (1, 3), (5, 2)}
 
 
 @pytest.mark.parametrize("count", [4, 8, 12, 40, 64])

@@ -81,7 +81,7 @@ class _PackTask:
     areas: np.ndarray
     low: np.ndarray
     sizes: np.ndarray
-    loose: np.ndarray
+    any_side: np.ndarray
     margin: float
     texture_size: int
     raster: int
@@ -136,7 +136,7 @@ def pack(
     texture_size: int = 1024,
     around: Sequence[tuple[np.ndarray, np.ndarray]] = (),
     roughly: bool = False,
-    loose: np.ndarray | None = None,
+    any_side: np.ndarray | None = None,
 ) -> Steps[Packing]:
     """Place islands in the unit square without overlap, all scaled by the same factor.
 
@@ -150,7 +150,7 @@ def pack(
     texture_size : pixels along a side of the unit square
     around : points (n,2) and triangles (m,3), of islands that stay in the unit square as they are
     roughly : on the coarse raster alone, in half of the time, to be compared with another packing
-    loose : (k,) bool, islands that may lie on any side, none by default
+    any_side : (k,) bool, islands that may lie on any side, none by default
 
     Raises
     ------
@@ -170,7 +170,7 @@ def pack(
     if len(heaped.points) == 1 and not len(around):
         placed, scale = _alone(points[0], (texture_size - margin) / texture_size)
     else:
-        free = np.zeros(len(islands), dtype=bool) if loose is None else loose
+        free = np.zeros(len(islands), dtype=bool) if any_side is None else any_side
         task = _task(heaped, heaped.kept(free), margin, texture_size, around)
         found = yield from _search(task, roughly)
         placed, scale = _filled(_placed(heaped.points, found), found.task, found.scale)
@@ -207,7 +207,7 @@ def _alone(points: np.ndarray, width: float) -> tuple[list[np.ndarray], float]:
     return [(points - 0.5 * (low + high)) * scale + 0.5], scale
 
 
-def _task(islands: Gathered, loose: np.ndarray, margin: float, texture_size: int, around) -> _PackTask:
+def _task(islands: Gathered, any_side: np.ndarray, margin: float, texture_size: int, around) -> _PackTask:
     points, faces = islands.points, islands.triangles
     low = np.array([p.min(axis=0) for p in points])
     staying = outlines_of([p * COARSE for p, _ in around], [t for _, t in around])
@@ -216,7 +216,7 @@ def _task(islands: Gathered, loose: np.ndarray, margin: float, texture_size: int
         areas=island_areas(points, faces),
         low=low,
         sizes=np.array([p.max(axis=0) for p in points]) - low,
-        loose=loose,
+        any_side=any_side,
         margin=margin,
         texture_size=texture_size,
         raster=COARSE,
@@ -332,9 +332,8 @@ def _rasterised(task: _PackTask, scale: float) -> _Raster:
     turnable = task.areas < SMALL * task.areas.sum()
     scaled = [task.outlines[number].scaled(scale, scale * task.low[number]) for number in single.tolist()]
     grown = grown_cells(scaled, task.growth)
-    turns = [
-        ANY_SIDE if loose else QUARTERS if small else (0,) for loose, small in zip(task.loose, turnable, strict=True)
-    ]
+    ways = zip(task.any_side, turnable, strict=True)
+    turns = [ANY_SIDE if any_side else QUARTERS if small else (0,) for any_side, small in ways]
     items = [task.item(cells, turns[k]) for k, (cells, _) in zip(single, grown, strict=True)]
     corners = np.array([low for _, low in grown], dtype=float)
     blocks = []

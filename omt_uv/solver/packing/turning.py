@@ -40,12 +40,12 @@ def pack_turned(
     count = (ANGLES_ALONE if len(islands) == 1 else ANGLES) if large.any() else 0
     for k, angle in enumerate(np.linspace(0, np.pi / 2, count, endpoint=False)):
         turned = [_turned(uv, angle) if is_large else uv for uv, is_large in zip(boxed, large, strict=True)]
-        trying = pack(turned, triangles, margin, texture_size, around, roughly=True, loose=may)
+        trying = pack(turned, triangles, margin, texture_size, around, roughly=True, any_side=may)
         scale = (yield from part_of(trying, TRYING * k / count, TRYING / count)).scale
         if scale > most:
             best, most = turned, scale
     begin = TRYING if count else 0.0
-    return (yield from part_of(pack(best, triangles, margin, texture_size, around, loose=may), begin, 1 - begin))
+    return (yield from part_of(pack(best, triangles, margin, texture_size, around, any_side=may), begin, 1 - begin))
 
 
 def in_smallest_box(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:

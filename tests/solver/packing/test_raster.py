@@ -147,34 +147,6 @@ def test_masks_as_wide_as_the_raster_have_the_places_that_they_have():
         taken[y, x : x + length] = True
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_lies_beside_a_mask_is_taken_or_outside(seed):
-    rng = np.random.default_rng(seed)
-    grid, mask = RasterGrid(21, 8), blob(rng, 9, 7)
-    grid.take(mask, 6, 5)
-    taken = np.ones((25, 25), bool)
-    taken[2:-2, 2:-2] = grid.taken
-    (turned,) = turned_masks(blob(rng, 4, 3), (0,)).turns
-    height, width = turned.mask.shape
-    places = np.array([[0, 0], [21 - width, 0], [0, 21 - height], [21 - width, 21 - height], [5, 6]])
-    expected = [[taken[2 + y + b, 2 + x + a] for a, b in turned.beside] for x, y in places]
-    np.testing.assert_allclose(grid.taken_share(turned.beside, places), np.mean(expected, axis=1))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_ends_of_free_places_are_those_of_the_outermost_rows_and_columns(seed):
-    rng = np.random.default_rng(seed)
-    grid, mask = RasterGrid(30, 8), np.ones((3, 2), bool)
-    for _ in range(12):
-        grid.take(np.ones((2, 2), bool), *rng.integers(0, 29, 2).tolist())
-    y, x = np.nonzero(free_places(grid, mask))
-    expected = {(x[y == row].min(), row) for row in (y.min(), y.max())}
-    expected |= {(x[y == row].max(), row) for row in (y.min(), y.max())}
-    expected |= {(column, y[x == column].min()) for column in (x.min(), x.max())}
-    expected |= {(column, y[x == column].max()) for column in (x.min(), x.max())}
-    assert grid.places(rectangles_of(mask).tolist(), 3, 2).ends() == expected
-
-
 def test_a_copy_of_a_raster_is_taken_by_itself():
     grid, mask = RasterGrid(20, 8), np.ones((3, 3), bool)
     other = grid.copy()
