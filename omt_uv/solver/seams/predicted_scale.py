@@ -159,9 +159,12 @@ class ScaleModel:
 def _root(block: np.ndarray, whole: float) -> tuple[np.ndarray, np.ndarray | slice]:
     """A root (j,j) of Green's function (k,k) between vertices, and which (j,) of these it is of: all, or where rounding
     of the whole, what was there before others were held, does not leave all told apart, those that it does."""
-    root, flaw = lapack.dpotrf(block, lower=1)
-    if flaw == 0 and np.square(root.diagonal()).min(initial=np.inf) > LEAST_PIVOT * whole:
-        return np.linalg.cholesky(block), slice(None)
+    try:
+        root = np.linalg.cholesky(block)
+    except np.linalg.LinAlgError:
+        root = np.zeros_like(block)
+    if np.square(root.diagonal()).min(initial=np.inf) > LEAST_PIVOT * whole:
+        return root, slice(None)
     # The freest first: where they are held, nothing is left at the others but rounding.
     root, order, rank, _ = lapack.dpstrf(block, tol=LEAST_ROUNDING * whole, lower=1)
     return np.tril(root[:rank, :rank]), order[:rank] - 1
