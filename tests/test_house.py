@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -13,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sources import tree_of
+from sources import nodes_of, tree_of, walked
 
 from omt_uv.solver import errors
 from omt_uv.solver.errors import MeshError
@@ -73,7 +74,13 @@ SHAPE = re.compile(r"\((\d|[a-z]{1,2}|\.\.\.),[^)]*\)")
 def nodes(paths, kind):
     """Pairs (path, node) of every node of a kind."""
     for path in paths:
-        yield from ((path, n) for n in ast.walk(tree_of(path)) if isinstance(n, kind))
+        yield from ((path, n) for n in nodes_of(path) if isinstance(n, kind))
+
+
+@functools.cache
+def imports_of(path):
+    """All that a file imports; what it says besides is not kept."""
+    return [n for n in walked(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Import | ast.ImportFrom)]
 
 
 def place(path, node):
@@ -197,7 +204,7 @@ def test_what_goes_together_ends_together():
 def test_tools_keep_the_rules_of_the_package(path):
     tree = tree_of(path)
     assert ast.get_docstring(tree)
-    for node in ast.walk(tree):
+    for node in walked(tree):
         if isinstance(node, ast.FunctionDef):
             assert node.end_lineno - node.lineno < MOST_FUNCTION_LINES, node.name
             assert len(node.args.args + node.args.kwonlyargs) <= MOST_PARAMETERS, node.name
@@ -232,9 +239,10 @@ def test_tests_find_what_they_share_without_changing_the_path():
 def test_tests_assert_nothing_about_time():
     """A machine that is busy would fail them. Only what plays in a real window has a patience."""
     clocks = {"time", "timeit"}
-    imports = nodes(TESTS, ast.Import | ast.ImportFrom)
     named = [
-        (place(p, n), [n.module] if isinstance(n, ast.ImportFrom) else [a.name for a in n.names]) for p, n in imports
+        (place(p, n), [n.module] if isinstance(n, ast.ImportFrom) else [a.name for a in n.names])
+        for p in TESTS
+        for n in imports_of(p)
     ]
     assert not [where for where, names in named if clocks & set(names)]
 
@@ -242,7 +250,7 @@ def test_tests_assert_nothing_about_time():
 def test_every_module_of_the_solver_is_imported_by_a_test():
     imported = set()
     for path in TESTS:
-        for node in ast.walk(tree_of(path)):
+        for node in imports_of(path):
             if isinstance(node, ast.ImportFrom) and node.module:
                 imported |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
     every = {

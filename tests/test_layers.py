@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from sources import tree_of
+from sources import nodes_of, tree_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "omt_uv"
@@ -155,7 +155,7 @@ def folder_of(name: str) -> str:
 
 def imports(path: Path):
     """Triples (level, module, names) of every import statement, wherever it stands."""
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
             yield from ((0, alias.name, ()) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -188,7 +188,7 @@ def arrows() -> dict[tuple[str, str], list[str]]:
 def functions():
     """Triples (place, node, arguments) of every function of the package."""
     for path in MODULES:
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 every = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
                 yield f"{path.relative_to(ROOT)}:{node.lineno} {node.name}", node, every
@@ -251,7 +251,7 @@ def test_functions_have_few_parameters():
 
 
 def test_every_class_name_is_there_once():
-    classes = Counter(n.name for p in MODULES for n in ast.walk(tree_of(p)) if isinstance(n, ast.ClassDef))
+    classes = Counter(n.name for p in MODULES for n in nodes_of(p) if isinstance(n, ast.ClassDef))
     assert not [name for name, count in classes.items() if count > 1]
 
 

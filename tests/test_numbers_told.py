@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 import pytest
-from sources import tree_of
+from sources import nodes_of
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted((ROOT / "omt_uv").rglob("*.py"))
@@ -24,7 +24,7 @@ PERCENTS = {"sums", "mean", "deviation", "p"}
 @functools.cache
 def nodes():
     """Calls and texts with something put in, by their files."""
-    return {path: [node for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call | ast.JoinedStr)]
+    return {path: [node for node in nodes_of(path) if isinstance(node, ast.Call | ast.JoinedStr)]
             for path in SOURCES}  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from kept import ROOT, check, modules
-from sources import tree_of
+from sources import nodes_of, walked
 
 TABLE = Path(__file__).with_name("texts.tsv")
 # From so many values on one can stand in the place of another.
@@ -39,13 +39,13 @@ def said(node):
 def rows():
     """A line of each text, by module and function."""
     for module in modules():
-        tree = tree_of(ROOT / f"{module.replace('.', '/')}.py")
+        nodes = nodes_of(ROOT / f"{module.replace('.', '/')}.py")
         owner = {}
-        for node in ast.walk(tree):
+        for node in nodes:
             if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
                 # Functions within others come later, and have what is theirs.
-                owner.update(dict.fromkeys(ast.walk(node), node.name))
-        for node in ast.walk(tree):
+                owner.update(dict.fromkeys(walked(node), node.name))
+        for node in nodes:
             text, words, count = said(node) or ("", "", 0)
             if count >= SEVERAL and re.search(r" [^\W\d]{2}", words):
                 yield "\t".join([module, owner.get(node, ""), "", " ".join(text.split())])

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Iterator
 from pathlib import Path
 
-from sources import tree_of
+from sources import tree_of, walked
 
 ROOT = Path(__file__).resolve().parents[1] / "omt_uv"
 # What is left out, by the function and the class that it makes: why it is left out.
@@ -46,7 +46,7 @@ def _is_dataclass(node: ast.AST) -> bool:
 @functools.cache
 def classes() -> dict[str, ast.ClassDef]:
     """Dataclasses by their names."""
-    return {node.name: node for tree in trees() for node in ast.walk(tree) if _is_dataclass(node)}
+    return {node.name: node for tree in trees() for node in walked(tree) if _is_dataclass(node)}
 
 
 def fields_of(name: str) -> list[str]:
@@ -64,7 +64,7 @@ def given(call: ast.Call, within: ast.FunctionDef) -> dict[str, ast.expr]:
     """What a call gives to each field; a tuple of that function that stands with a star by its parts."""
     tuples = {
         line.targets[0].id: line.value.elts
-        for line in ast.walk(within)
+        for line in walked(within)
         if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name) and isinstance(line.value, ast.Tuple)
     }
     values: list[ast.expr] = []
@@ -83,10 +83,10 @@ def left_out() -> list[tuple[str, str, set[str]]]:
 
 def _left_out() -> Iterator[tuple[str, str, set[str]]]:
     for tree in trees():
-        for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
+        for function in (node for node in walked(tree) if isinstance(node, ast.FunctionDef)):
             every = [*function.args.args, *function.args.kwonlyargs]
             kinds = {a.arg: ast.unparse(a.annotation).partition(" |")[0] for a in every if a.annotation}
-            for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+            for call in (node for node in walked(function) if isinstance(node, ast.Call)):
                 if not isinstance(call.func, ast.Name) or call.func.id not in classes():
                     continue
                 if any(one.arg is None for one in call.keywords):
@@ -115,7 +115,7 @@ def test_what_is_left_out_with_a_reason_is_left_out():
 
 def _mentions(function: ast.FunctionDef, name: str) -> bool:
     """Whether a function hands on the warnings of a parameter, or all of it."""
-    for node in ast.walk(function):
+    for node in walked(function):
         if isinstance(node, ast.Attribute) and node.attr == "warnings" and ast.unparse(node.value) == name:
             return True
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "replace" and ast.unparse(node.args[0]) == name:
@@ -126,11 +126,11 @@ def _mentions(function: ast.FunctionDef, name: str) -> bool:
 def silent() -> Iterator[tuple[str, str, str]]:
     """Function, class that it makes with warnings of its own, and a parameter that has some, of which it takes none."""
     for tree in trees():
-        for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
+        for function in (node for node in walked(tree) if isinstance(node, ast.FunctionDef)):
             every = [*function.args.args, *function.args.kwonlyargs]
             kinds = {a.arg: ast.unparse(a.annotation).partition(" |")[0] for a in every if a.annotation}
             of = [n for n, kind in kinds.items() if kind in classes() and "warnings" in fields_of(kind)]
-            for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+            for call in (node for node in walked(function) if isinstance(node, ast.Call)):
                 if not isinstance(call.func, ast.Name) or call.func.id not in classes():
                     continue
                 told = given(call, function).get("warnings")

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sources import nodes_of, walked
 
 import omt_uv
 from omt_uv import supervision
@@ -33,9 +34,9 @@ def functions() -> list[tuple[str, list[ast.AST]]]:
     """Names of all functions of the package, but for those of the solver, and what stands in each."""
     paths = [path for path in sorted(ROOT.rglob("*.py")) if not path.is_relative_to(ROOT / "solver")]
     return [
-        (".".join([*path.relative_to(ROOT).with_suffix("").parts, node.name]), list(ast.walk(node)))
+        (".".join([*path.relative_to(ROOT).with_suffix("").parts, node.name]), walked(node))
         for path in paths
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in nodes_of(path)
         if isinstance(node, ast.FunctionDef)
     ]
 

@@ -84,10 +84,17 @@ def spaced(text: str) -> str:
     return f" {' '.join(words_of(text))} "
 
 
+@functools.cache
+def whole(path: Path) -> str:
+    """The words of a file's name and of all that is in it, spaced; what the lines below have stands in it, too."""
+    return f" {' '.join(words_of(f'{path.stem} {path.read_text()}'))} "
+
+
 def found(terms: list[str], paths: list[Path]):
     """Pairs of place and term, wherever a term stands."""
     pattern = pattern_of(terms)
-    for path in paths:
+    # To tell names, comments and strings from the rest takes ten times as long.
+    for path in (p for p in paths if pattern.search(whole(p))):
         for number, line in lines_of(path):
             for match in pattern.finditer(spaced(line)):
                 yield f"{path.relative_to(ROOT)}:{number}", terms[match.lastindex - 1]
@@ -105,8 +112,8 @@ def test_no_word_that_the_glossary_bans_is_used():
 
 
 def test_every_word_that_the_glossary_gives_is_used():
-    code = "|".join({spaced(line) for p in files() if p.is_relative_to(ROOT / "omt_uv") for _, line in lines_of(p)})
-    assert not [row[0] for row in rows() if not pattern_of([row[0]]).search(code)]
+    paths = [p for p in files() if p.is_relative_to(ROOT / "omt_uv")]
+    assert not [row[0] for row in rows() if not any(found([row[0]], paths))]
 
 
 def test_no_word_stands_twice_in_the_glossary():

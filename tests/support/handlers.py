@@ -49,7 +49,9 @@ def _found() -> Iterator[Handler]:
 
 
 def _tries(node: ast.AST, function: str) -> Iterator[tuple[str, ast.Try]]:
-    for child in ast.iter_child_nodes(node):
+    # Statements stand in these alone.
+    held = (getattr(node, name, ()) for name in ("body", "cases", "handlers", "orelse", "finalbody"))
+    for child in (each for inner in held if isinstance(inner, list) for each in inner):
         name = function
         if isinstance(child, ast.FunctionDef | ast.ClassDef):
             name = f"{function}.{child.name}".strip(".")

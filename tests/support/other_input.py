@@ -52,9 +52,10 @@ class Asked(Told):
     def begin(self, name: str, function: Callable, args: tuple, kwargs: dict) -> Call | None:
         """A call that begins; the first ones of a function in a run are kept."""
         call = super().begin(name, function, args, kwargs)
+        if call is None or call.args[0] != 1:
+            return call
         kept = self.calls.setdefault(name, [])
-        first = call is not None and call.args[0] == 1 and len(kept) < KEPT and not name.startswith(LEAVES_FILES)
-        if first and _size((args, kwargs)) < LARGEST:
+        if len(kept) < KEPT and not name.startswith(LEAVES_FILES) and _size((args, kwargs)) < LARGEST:
             # What cannot be copied, as a factorisation, is not asked for.
             with contextlib.suppress(TypeError, NotImplementedError, ValueError):
                 kept.append(Call(name, function, *copied((args, kwargs))))

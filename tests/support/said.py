@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from sources import tree_of
+from sources import nodes_of, walked
 
 import omt_uv
 
@@ -22,6 +22,8 @@ LISTS = ("__init__.py", "choices.py")
 OTHER_CALLS = re.compile(r".*(Error|Refusal|Progress|Property)$|plural|part_of|warns?|add_argument|strip")
 # Arguments and attributes that hold other texts.
 OTHER_NAMES = {"remedy", "description", "help", "metavar", "name", "kind", "epilog", "text", "words"}
+# Nodes of which some parts say no warnings.
+HOLDING = (ast.Raise, ast.Module, ast.ClassDef, ast.FunctionDef, ast.Call, ast.Assign, ast.AnnAssign)
 
 
 class Sentence(NamedTuple):
@@ -46,18 +48,19 @@ def sentences(*folders: str) -> list[Sentence]:
 
 @functools.cache
 def _texts_of(path: Path) -> tuple[str, ...]:
-    return tuple(_texts(tree_of(path)))
+    return tuple(_texts(nodes_of(path)))
 
 
-def _texts(tree: ast.Module) -> Iterator[str]:
-    left_out = {id(inner) for node in ast.walk(tree) for other in _others(node) for inner in ast.walk(other)}
-    for node in ast.walk(tree):
-        if id(node) in left_out:
+def _texts(nodes: list[ast.AST]) -> Iterator[str]:
+    holding = [node for node in nodes if isinstance(node, HOLDING)]
+    left_out = {id(inner) for node in holding for other in _others(node) for inner in walked(other)}
+    for node in nodes:
+        if not isinstance(node, ast.JoinedStr | ast.Constant) or id(node) in left_out:
             continue
         if isinstance(node, ast.JoinedStr):
             text = "".join(v.value if isinstance(v, ast.Constant) else "{}" for v in node.values)
-            left_out |= {id(inner) for inner in ast.walk(node)}
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            left_out |= {id(inner) for inner in walked(node)}
+        elif isinstance(node.value, str):
             text = re.sub(r"{[^}]*}", "{}", node.value)
         else:
             continue
