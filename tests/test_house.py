@@ -80,7 +80,8 @@ def nodes(paths, kind):
 @functools.cache
 def imports_of(path):
     """All that a file imports; what it says besides is not kept."""
-    return [n for n in walked(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Import | ast.ImportFrom)]
+    every = walked(ast.parse(path.read_text(encoding="utf-8")))
+    return [n for n in every if isinstance(n, ast.Import | ast.ImportFrom)]
 
 
 def place(path, node):

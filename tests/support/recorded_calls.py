@@ -33,6 +33,8 @@ HUGE = 1e100
 KINDS = {"b": 0.11, "i": 0.07, "u": 0.17, "c": 0.05}
 # So far objects in objects are looked into.
 DEEP = 5
+# What most values are.
+PLAIN = {float, int, bool, np.ndarray}
 # What Blender calls by itself, and counts the arguments of.
 CALLED_BY_BLENDER = {"cancel", "check", "description", "draw", "execute", "invoke", "modal", "poll", "draw_header",
                      "draw_header_preset"}  # fmt: skip
@@ -83,6 +85,9 @@ def leaves(value, depth: int = 0) -> Iterator[np.ndarray]:
 def told_leaves(value, depth: int = 0, errors: bool = False) -> Iterator[np.ndarray]:
     """Leaves as above of what is told as well: the letters of texts without paths, and the numbers in them;
     those of errors, too, if asked for."""
+    if type(value) in PLAIN:
+        yield np.asarray(value)
+        return
     if isinstance(value, Enum):
         value = value.value
     if errors and isinstance(value, BaseException):
@@ -157,26 +162,29 @@ def _several(leaf: np.ndarray, turn: float) -> tuple[int, float, float]:
     x = _fewer(leaf)
     if x.dtype.kind == "c":
         x = np.concatenate([x.real, x.imag])
-    total = np.abs(x).sum()
+    # Faster than `sum`, and most arrays are short.
+    total = float(np.add.reduce(np.abs(x)))
     if not total < HUGE:
         x = np.nan_to_num(x, nan=7.0, posinf=9.0, neginf=-9.0)
         # What stands for infinite would leave nothing of all else.
         x = np.where(np.abs(x) < HUGE, x, 9.0 * np.sign(x))
-        total = np.abs(x).sum()
-    even, odd = _waves()
-    return len(x), total, math.cos(turn) * (even[: len(x)] @ x) - math.sin(turn) * (odd[: len(x)] @ x)
+        total = float(np.add.reduce(np.abs(x)))
+    even, odd = (_waves()[:, : len(x)] @ x).tolist()
+    return len(x), total, math.cos(turn) * even - math.sin(turn) * odd
 
 
 @functools.cache
-def _waves() -> tuple[np.ndarray, np.ndarray]:
+def _waves() -> np.ndarray:
     """Cosine and sine by which numbers count where they stand."""
     angle = 0.3 + 1.7 * np.arange(2 * SAMPLED)
-    return np.cos(angle), np.sin(angle)
+    return np.stack([np.cos(angle), np.sin(angle)])
 
 
 def _fewer(leaf: np.ndarray) -> np.ndarray:
     """The numbers of an array in a row; of many, as of a picture, sums of some each."""
-    flat = leaf.ravel().astype(complex if leaf.dtype.kind == "c" else float, copy=False)
+    flat = leaf.ravel()
+    if flat.dtype.char not in "dD":
+        flat = flat.astype(complex if flat.dtype.kind == "c" else float)
     many = 1 + flat.size // SAMPLED
     if many == 1:
         return flat
@@ -188,7 +196,7 @@ def _fewer(leaf: np.ndarray) -> np.ndarray:
 
 def _kind(leaf: np.ndarray) -> float:
     """A figure of the kind of numbers that an array holds, and of its shape: 0 for a row of numbers of full length."""
-    kind = KINDS.get(leaf.dtype.kind, 0.23 * (leaf.dtype == np.float32))
+    kind = KINDS.get(leaf.dtype.kind, 0.23 * (leaf.dtype.char == "f"))
     return kind + sum(0.03 * axis * n for axis, n in enumerate(leaf.shape)) if leaf.ndim > 1 else kind
 
 
@@ -282,7 +290,7 @@ class Record:
         self._in_this_run = set()
 
     def begin(self, name: str, function: Callable, args: tuple, kwargs: dict) -> Call | None:
-        """A call that begins; None if it is not kept."""
+        """A call that begins; None if it is not kept, and then nothing is heard of it."""
         if name in self._in_this_run or len(self.calls.get(name, ())) >= self.most:
             return None
         self._in_this_run.add(name)
@@ -439,6 +447,8 @@ def _watched(record: Record, name: str, function: Callable, is_method: bool) -> 
         @functools.wraps(function)
         def steps(*args, **kwargs):
             call = record.begin(name, function, args, kwargs)
+            if call is None:
+                return (yield from function(*args, **kwargs))
             found = yield from _listened(record, call, function(*args, **kwargs))
             record.end(call, args, kwargs, found, is_method)
             return found
@@ -448,6 +458,8 @@ def _watched(record: Record, name: str, function: Callable, is_method: bool) -> 
     @functools.wraps(function)
     def plain(*args, **kwargs):
         call = record.begin(name, function, args, kwargs)
+        if call is None:
+            return function(*args, **kwargs)
         try:
             found = function(*args, **kwargs)
         except Exception as error:
