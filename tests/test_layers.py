@@ -266,21 +266,23 @@ def test_one_named_constant_a_line():
     assert not found, "\n".join(found)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_modules_stay_small(path):
-    assert len(path.read_text().splitlines()) <= MOST_LINES
+def test_modules_stay_small():
+    assert len(MODULES) > 500
+    assert not [str(path) for path in MODULES if len(path.read_text().splitlines()) > MOST_LINES]
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_imports_from_outside(path):
+def test_imports_from_outside():
     """The package imports itself relatively (inside Blender it has another name), the solver numpy and scipy alone."""
-    outside = {module.split(".")[0] for level, module, _ in imports(path) if level == 0} - set(sys.stdlib_module_names)
-    assert "omt_uv" not in outside
-    folder = folder_of(name_of(path))
-    if folder.split(".")[0] == "solver":
-        assert outside <= SOLVER_LIBRARIES | OPTIONAL.get(name_of(path), set())
-    if folder.split(".")[0] not in (*KNOW_BLENDER, "registration"):
-        assert not outside & {"bpy", "bmesh", "gpu", "blf", "mathutils", "imbuf"} or path.name == "__main__.py"
+    for path in MODULES:
+        named = {module.split(".")[0] for level, module, _ in imports(path) if level == 0}
+        outside = named - set(sys.stdlib_module_names)
+        assert "omt_uv" not in outside, path
+        folder = folder_of(name_of(path))
+        if folder.split(".")[0] == "solver":
+            assert outside <= SOLVER_LIBRARIES | OPTIONAL.get(name_of(path), set()), path
+        if folder.split(".")[0] not in (*KNOW_BLENDER, "registration"):
+            blender = outside & {"bpy", "bmesh", "gpu", "blf", "mathutils", "imbuf"}
+            assert not blender or path.name == "__main__.py", path
 
 
 def test_entry_of_the_extension_imports_nothing_at_the_top():
