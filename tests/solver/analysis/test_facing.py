@@ -1,5 +1,7 @@
 """Where a head looks to: where its nose and sockets are, however it is turned, and whatever was told to be up."""
 
+import functools
+
 import meshes
 import numpy as np
 import pytest
@@ -21,9 +23,13 @@ from omt_uv.solver.analysis.saliency import saliency, unit_size
 from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane, symmetry_plane
 
 
+def looked_at(V, F):
+    """What both functions are told of a body, wherever it is seen from."""
+    return unit_size(V, F), F, saliency(V, F), symmetry_plane(V, F)
+
+
 def looks_to(V, F, axes=None):
-    P = unit_size(V, F)
-    return facing(P, F, saliency(V, F), symmetry_plane(V, F), axes)
+    return facing(*looked_at(V, F), axes)
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), *Rotation.random(1, random_state=1).as_matrix()])
@@ -73,7 +79,7 @@ def test_a_beast_looks_where_its_head_is_held_up_and_its_chest_is_no_face(ahead)
 
 
 def stands(V, F, axes):
-    return standing(unit_size(V, F), F, saliency(V, F), symmetry_plane(V, F), axes)
+    return standing(*looked_at(V, F), axes)
 
 
 # What a file with another up is read as: on its back, on its face, and both upside down.
@@ -177,9 +183,8 @@ def test_a_beast_looks_where_it_is_ahead_of_its_feet_whatever_stands_out_at_its_
 
 
 def test_a_published_figure_looks_where_its_face_is_wherever_it_is_seen_from():
-    V, F = published("homer")
     for viewer in (1.0, -1.0):
-        seen = looks_to(V, F, SceneAxes((0.0, 1.0, 0.0), (0.0, 0.0, viewer)))
+        seen = facing(*published("homer"), SceneAxes((0.0, 1.0, 0.0), (0.0, 0.0, viewer)))
         assert seen.front[2] > 0.99 and seen.certainty >= FIGURE
 
 
@@ -206,9 +211,15 @@ def test_what_stands_or_cannot_be_told_is_believed():
 
 
 def published(name):
+    """What is told of a published model, which several tests look at."""
     if meshes.model_path(name) is None:
         pytest.skip("no models")
-    return meshes.load_model(name)
+    return _published(name)
+
+
+@functools.cache
+def _published(name):
+    return looked_at(*meshes.load_model(name))
 
 
 @pytest.mark.parametrize(
@@ -216,33 +227,31 @@ def published(name):
 )
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
 def test_published_heads_that_lie_look_where_their_faces_are(name, front, up):
-    V, F = published(name)
     axes = SceneAxes(up=up, viewer=(0.0, -up[2], 0.0))
-    found = stands(V, F, axes)
-    assert abs(found.up[1]) > 0.99 and looks_to(V, F, found).front @ front > 0.95
+    found = standing(*published(name), axes)
+    assert abs(found.up[1]) > 0.99 and facing(*published(name), found).front @ front > 0.95
     # Without that it is the crown, the neck, or nothing at all.
-    assert looks_to(V, F, axes).front @ front < 0.1
+    assert facing(*published(name), axes).front @ front < 0.1
 
 
 @pytest.mark.parametrize(("name", "front"), [("spot", 2), ("camel_b", 2), ("cow", 0), ("homer", 2), ("ogre", 2)])
 @pytest.mark.parametrize("of", ["head or rump", "side"])
 def test_published_models_that_lie_stand_on_their_legs(name, front, of):
     """Seen from above, as where Z is up of a file that is read with Y up."""
-    V, F = published(name)
+    told = published(name)
     ahead, aside = np.eye(3)[front], np.eye(3)[2 - front]
-    found = stands(V, F, SceneAxes(up=tuple(aside if of == "side" else -ahead), viewer=(0.0, 1.0, 0.0)))
+    found = standing(*told, SceneAxes(up=tuple(aside if of == "side" else -ahead), viewer=(0.0, 1.0, 0.0)))
     np.testing.assert_allclose(found.up, [0, 1, 0], atol=0.01)
-    upright = looks_to(V, F, SceneAxes(up=(0.0, 1.0, 0.0), viewer=tuple(ahead)))
-    assert looks_to(V, F, found).front @ upright.front > 0.99
+    upright = facing(*told, SceneAxes(up=(0.0, 1.0, 0.0), viewer=tuple(ahead)))
+    assert facing(*told, found).front @ upright.front > 0.99
 
 
 @pytest.mark.parametrize(
     "name", ["spot", "cow", "camel_b", "homer", "ogre", "armadillo", "lion", "face", "suzanne", "beetle"]
 )
 def test_published_models_that_stand_are_believed(name):
-    V, F = published(name)
     axes = SceneAxes(up=(0.0, 1.0, 0.0), viewer=(0.0, 0.0, 1.0))
-    assert stands(V, F, axes) is axes
+    assert standing(*published(name), axes) is axes
 
 
 def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():
@@ -259,5 +268,4 @@ def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():
     [("optcuts_face", (0, 0, 1)), ("max_planck", (0, 0, -1)), ("david", (-0.67, 0.73, 0)), ("lion", (-0.23, 0, -0.97))],
 )
 def test_published_heads_look_where_their_faces_are(name, front):
-    V, F = published(name)
-    assert looks_to(V, F).front @ front > np.cos(np.pi / 4)
+    assert facing(*published(name), None).front @ front > np.cos(np.pi / 4)
