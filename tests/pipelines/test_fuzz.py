@@ -1,4 +1,4 @@
-"""Thousands of broken meshes: every outcome is a map or a named error, and the input stays as it was."""
+"""Hundreds of broken meshes: every outcome is a map or a named error, and the input stays as it was."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
-CASES = 2100
-CHUNKS = 21
+CASES = 500
+CHUNKS = 5
+# Of the 1600 cases after these, those that come to lines of the package to which none before them does.
+SELDOM = [528, 547, 549, 557, 571, 593, 600, 674, 681, 687, 724, 758, 835, 864, 871, 1005, 1010, 1217, 1339, 1425, 1434,
+          1474, 1493, 1516, 1548, 1623, 1770, 1781, 1878, 1942, 2001, 2059]  # fmt: skip
 # What became of cases that have been tried.
 OUTCOMES: dict[int, str] = {}
 
@@ -52,6 +55,12 @@ def check_outcome(seed, surface, faces, options):
 def test_every_outcome_is_a_map_or_a_named_error(chunk):
     for seed in range(chunk * CASES // CHUNKS, (chunk + 1) * CASES // CHUNKS):
         OUTCOMES[seed] = check_outcome(seed, *broken_mesh(seed))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("seed", SELDOM)
+def test_what_is_seldom_done_ends_as_well(seed):
+    check_outcome(seed, *broken_mesh(seed))
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from omt_uv.files.in_place import glb, glb_data, glb_layout
 from omt_uv.files.in_place.glb_data import COMPONENTS, WIDTHS, Glb
+from omt_uv.files.in_place.imported import InPlaceError
 
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
@@ -61,6 +64,26 @@ def read(glb, index):
     begin = view.get("byteOffset", 0) + of.get("byteOffset", 0)
     rows = [glb.binary[begin + k * stride : begin + k * stride + kind.itemsize * width] for k in range(of["count"])]
     return np.array([np.frombuffer(row, kind) for row in rows])
+
+
+@pytest.mark.parametrize("code", COMPONENTS)
+@pytest.mark.parametrize("beside", [0, 1, 4])
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_values_that_end_where_the_file_ends_are_read_and_one_byte_fewer_is_none(code, beside, count):
+    """Of every type and width, each alone and in rows with others: what stands behind the last of them may be gone."""
+    kind = np.dtype(COMPONENTS[code])
+    for (width, name), begin in product(KINDS.items(), (0, 8)):
+        size = kind.itemsize * width
+        stride = size + beside * kind.itemsize
+        raw = np.random.default_rng(width).integers(0, 256, begin + stride * max(count - 1, 0) + size, np.uint8)
+        doc = {"buffers": [{}], "bufferViews": [{"byteOffset": begin, "byteStride": stride * bool(beside)}],
+               "accessors": [{"bufferView": 0, "componentType": code, "count": count, "type": name}]}  # fmt: skip
+        whole = Glb(doc, raw.tobytes(), [])
+        found = glb_data.accessor(whole, 0)
+        assert found.shape == (count, width) and found.tobytes() == read(whole, 0).tobytes()
+        if count:
+            with pytest.raises(InPlaceError, match="leads out of the file"):
+                glb_data.accessor(Glb(doc, raw.tobytes()[:-1], []), 0)
 
 
 def pictures(glb):

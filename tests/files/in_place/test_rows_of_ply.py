@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mesh_bytes import imported
 
-from omt_uv.files.in_place import ply
+from omt_uv.files.in_place import ply, ply_rows
 
 PLACES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 2, 0]], np.float32)
 # Of these single precision has none.
@@ -38,6 +38,50 @@ def file_of(form: str, kind: str, faces_first: bool, end: str, ends: bool) -> by
     vertices = b"".join(struct.pack(f"{order}3f2{width}", *p, *uv) for p, uv in zip(PLACES.tolist(), UVS, strict=True))
     faces = struct.pack(f"{order}B4i", 4, 0, 1, 2, 3)
     return (end.join(head) + end).encode() + (faces + vertices if faces_first else vertices + faces)
+
+
+# The letters by which Python knows each type of number.
+LETTERS = {"char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
+           "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f",
+           "double": "d", "float64": "d"}  # fmt: skip
+
+
+def ends_of(letter: str) -> list:
+    """The least and the greatest number of a type, and one between."""
+    if letter in "fd":
+        return [-1.5e30, 1.25, 3.0e-30]
+    top = 1 << (8 * struct.calcsize(f"<{letter}"))
+    return [0, 100, top - 1] if letter.isupper() else [-top // 2, 100, top // 2 - 1]
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("kind", LETTERS)
+def test_numbers_of_every_type_are_those_that_python_reads(kind, form):
+    """Alone, and in lists of every length with every type of a count, at both ends of what a type can hold."""
+    assert set(LETTERS) == set(ply_rows.TYPES)
+    letter, order = LETTERS[kind], FORMS[form]
+    for counter in (k for k in LETTERS if LETTERS[k] not in "fd"):
+        head = f"ply\nformat {form} 1.0\nelement row 4\nproperty {kind} one\n"
+        head += f"property list {counter} {kind} several\nproperty uchar last\nend_header\n"
+        ends = ends_of(letter)
+        rows = [(ends[k % 3], ends[:k], 7 + k) for k in range(4)]
+        if order:
+            letters = [f"{order}{letter}{LETTERS[counter]}{len(many)}{letter}B" for _, many, _ in rows]
+            body = b"".join(
+                struct.pack(of, one, len(many), *many, k) for of, (one, many, k) in zip(letters, rows, strict=True)
+            )
+        else:
+            body = "".join(f"{one!r} {len(many)} {' '.join(map(repr, many))} {k}\n" for one, many, k in rows).encode()
+        data = head.encode() + body
+        header = ply_rows.read_header(data)
+        element = header.find("row")
+        found = ply_rows.read_rows(data, header, {"row"})["row"]
+        tell = np.float32 if letter == "f" and order else float if letter in "fd" else int
+        assert list(ply_rows.scalars(data, header, element, found, "one")) == [tell(one) for one, *_ in rows]
+        told = [tell(x) for _, many, _ in rows for x in many]
+        assert list(ply_rows.lists(data, header, element, found, "several")) == told
+        assert list(ply_rows.scalars(data, header, element, found, "last")) == [7, 8, 9, 10]
+        assert found.count["several"].tolist() == [0, 1, 2, 3] and found.start[-1] == len(data)
 
 
 @pytest.mark.parametrize("ends", [True, False])

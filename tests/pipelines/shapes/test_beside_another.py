@@ -130,7 +130,8 @@ def test_the_signature_is_that_of_the_largest_part_wherever_it_is(first, apart):
 @pytest.mark.parametrize("first", FIRST)
 def test_markers_say_which_of_several_surfaces_is_compared_however_large_it_is(first):
     V, F = meshes.bumpy(7, 7)
-    own, other = (V, F), (4 * V + [9, 0, 0], F)
+    # Of as many vertices, and of another shape.
+    own, other = (V, F), (V * [4, 4, -9] + [9, 0, 0], F)
     marks = distance.markers_of([27], [4])
     given = surfaces(*((own, other) if first else (other, own)))
     found = signed(given, [marks, None] if first else [None, marks])

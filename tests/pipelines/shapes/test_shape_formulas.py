@@ -130,9 +130,17 @@ def test_what_is_linear_is_carried_to_cells_exactly():
     # What cannot be blended is that of a vertex, or corner, of the polygon around.
     every = polygons(surface)
     start = np.repeat(np.arange(len(mesh.triangle)), np.diff(mesh.face_start))
+    _, corners, _ = chosen_triangles(surface, None)
+    other = 0
     for k, v in enumerate(mesh.corner_vertex):
         assert surface.face_start[f[start[k]]] <= m[k] < surface.face_start[f[start[k]] + 1]
         assert any(n[v] in every[q] for q in f[start[mesh.corner_vertex == v]])
+        # Of the corners of the triangle that it lies in, the one by which it lies.
+        mine = corners[mesh.triangle[start[k]]]
+        shares = np.linalg.lstsq(np.vstack([V[corner[mine]].T, np.ones(3)]), [*mesh.positions[v], 1], rcond=None)[0]
+        assert shares[mine == m[k]] >= shares.max() - 1e-9
+        other += int(m[k] != mine[0])
+    assert other > 5
 
 
 @pytest.mark.parametrize(("kind", "shape"), [("FLOAT", ()), ("FLOAT2", (2,)), ("FLOAT_VECTOR", (3,)), ("INT", ())])
