@@ -94,6 +94,45 @@ def test_a_file_of_several_objects_holds_what_files_of_each_hold(package, tmp_pa
         assert alone == faces_of(objects)
 
 
+# A normal that no face of a patch has.
+ASKEW = (0.6, 0.0, 0.8)
+
+
+@pytest.mark.parametrize("which", [[0], [1], [2], [0, 2], [0, 1, 2]])
+@pytest.mark.parametrize("suffix", [".obj", ".glb", ".gltf", ".fbx"])
+def test_normals_of_its_own_are_those_of_the_object_that_has_them(package, tmp_path, suffix, which):
+    objects, path = patches(), tmp_path / f"made{suffix}"
+    for k in which:
+        objects[k].data.normals_split_custom_set([ASKEW] * len(objects[k].data.loops))
+    bpy.context.view_layer.update()
+    own = {}
+    for k, obj in enumerate(objects):
+        for corner, loop in zip(obj.data.corner_normals, obj.data.loops, strict=True):
+            own.setdefault((k, loop.vertex_index), []).append(np.array(corner.vector))
+        assert all(np.allclose(n, ASKEW, atol=0.01) for n in own[k, 0]) == (k in which)
+    places = np.array([obj.data.vertices[v].co for obj in objects for v in range(len(obj.data.vertices))])
+    normals = [own[k, v] for k, obj in enumerate(objects) for v in range(len(obj.data.vertices))]
+    package("files.export").export(path, suffix, objects, False)
+    before = set(bpy.data.objects)
+    if suffix == ".obj":
+        bpy.ops.wm.obj_import(filepath=str(path), **package("files.meshes").AXES)
+    elif suffix == ".fbx":
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    else:
+        bpy.ops.import_scene.gltf(filepath=str(path))
+    bpy.context.view_layer.update()
+    seen = 0
+    for obj in set(bpy.data.objects) - before:
+        turn = np.array(obj.matrix_world)[:3, :3]
+        for corner, loop in zip(obj.data.corner_normals, obj.data.loops, strict=True):
+            place = np.array(obj.matrix_world @ obj.data.vertices[loop.vertex_index].co)
+            normal = turn @ np.array(corner.vector)
+            nearest = np.linalg.norm(places - place, axis=1).argmin()
+            assert min(np.linalg.norm(normal / np.linalg.norm(normal) - n) for n in normals[nearest]) < 0.02
+            seen += 1
+    assert seen >= sum(len(obj.data.loops) for obj in objects)
+
+
 @pytest.mark.parametrize("bare", range(4))
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_file_of_objects_of_which_some_have_no_uvs_holds_them_all(package, tmp_path, suffix, bare):

@@ -103,6 +103,59 @@ def test_what_moves_lies_where_a_mesh_without_a_transform_has_it(kind, stand):
         assert stays.sum() == len(before) // 4
 
 
+# Operators that measure, what they write, and whether one object is measured or two.
+MEASURING = {
+    "key": ("object.omt_strain", {"of": "KEY"}, "OMT Strain", False),
+    "UVs": ("object.omt_strain", {"of": "UV"}, "OMT Strain", False),
+    "pose": ("object.omt_strain", {"of": "OBJECT"}, "OMT Strain", True),
+    "distance": ("object.omt_distance", {}, "OMT Distance", True),
+}
+
+
+def pose_and_key(stand, applied):
+    """A body with a key and UVs, and a pose of it that stands elsewhere; or both with their transforms applied."""
+    obj = standing(stand, False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    points = np.array([v.co[:] for v in obj.data.vertices])
+    bent = points + np.stack([0.2 * points[:, 2] ** 2, 0.1 * points[:, 0], 0 * points[:, 0]], axis=1)
+    other = scenes.add(1.1 * bent, [p.vertices[:] for p in obj.data.polygons], "Pose")
+    other.scale, other.rotation_euler, other.location = (0.8, 1.2, 1.1), (0.2, 0.1, 0.7), (1.5, 2.5, 0.5)
+    obj.shape_key_add(name="Basis")
+    for item, place in zip(obj.shape_key_add(name="Bent").data, bent.tolist(), strict=True):
+        item.co = place
+    obj.active_shape_key_index = 1
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    bpy.context.view_layer.update()
+    for each in (obj, other) if applied else ():
+        matrix = each.matrix_world.copy()
+        each.parent = None
+        each.matrix_world = np.eye(4).tolist()
+        # Corners stay in their order: lengths are all that is measured.
+        each.data.transform(matrix, shape_keys=True)
+        each.data.update()
+    bpy.context.view_layer.update()
+    return obj, other
+
+
+@pytest.mark.parametrize("stand", STANDS)
+@pytest.mark.parametrize("kind", MEASURING)
+def test_what_is_measured_is_what_a_mesh_without_a_transform_has(package, monkeypatch, kind, stand):
+    monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 500)
+    operator, arguments, attribute, both = MEASURING[kind]
+    module, verb = operator.split(".")
+    found = []
+    for applied in (False, True):
+        obj, other = pose_and_key(stand, applied)
+        scenes.select([other, obj] if both else [obj])
+        assert getattr(getattr(bpy.ops, module), verb)(**arguments) == {"FINISHED"}
+        items = obj.data.attributes[attribute].data
+        values = np.zeros(len(items), np.float32)
+        items.foreach_get("value", values)
+        found.append(values)
+    assert np.ptp(found[0]) > 0.05
+    np.testing.assert_allclose(*found, atol=2e-4)
+
+
 @pytest.mark.parametrize("stand", STANDS)
 @pytest.mark.parametrize("name", MAKING)
 def test_what_is_made_lies_on_the_body_and_looks_where_it_does(name, stand):
