@@ -340,6 +340,8 @@ def test_every_operator_is_in_the_one_submenu(package):
     }
     names = {scenes.name_of(cls) for cls in our_classes(package, bpy.types.Operator)}
     assert names - hidden == set(record) and len(record) == len(set(record))
+    # From whichever editor it is opened, an entry does what a click on a button does.
+    assert stand_in.layout.operator_context == "INVOKE_DEFAULT"
     for menu in menus.menus():
         entry = []
         menus.draw_menu(types.SimpleNamespace(layout=Layout(entry)), bpy.context)

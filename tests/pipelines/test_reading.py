@@ -4,7 +4,29 @@ from dataclasses import replace
 
 import meshes
 import numpy as np
+import pytest
 from readings import reading
+
+from omt_uv.pipelines.reading import check_uvs
+from omt_uv.solver.errors import NonFiniteError
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_uvs_that_are_nowhere_are_refused_of_the_polygons_that_are_asked_for(wrong, axis):
+    V, F = meshes.grid(2, 2)
+    surface = reading(V, F).surface
+    rng = np.random.default_rng(axis)
+    for polygon in range(len(F)):
+        uv = V[F].reshape(-1, 3)[:, :2].copy()
+        uv[3 * polygon + polygon % 3, axis] = wrong
+        for faces in (None, *(rng.random((6, len(F))) < 0.5)):
+            if faces is not None and not faces[polygon]:
+                check_uvs(surface, uv, faces)
+                continue
+            with pytest.raises(NonFiniteError) as caught:
+                check_uvs(surface, uv, faces)
+            assert caught.value.elements.tolist() == [polygon] and caught.value.kind == "face"
 
 
 def test_without_uvs_there_are_no_pins():

@@ -6,6 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.pipelines.arranging.actions import rectify_islands, stack_islands
 from omt_uv.pipelines.distortion import measure_readings, worst_faces
 from omt_uv.pipelines.globe import GlobeJob, Markers, project
 from omt_uv.pipelines.layout import UnwrapJob
@@ -100,6 +101,16 @@ def scaled(reading, weights, density, first):
     return corners, uv, texel_density([reading], texels), ()
 
 
+def stacked(reading, weights, density, first):
+    found = stack_islands([reading], True)
+    return found.corners[0], found.uv[0], found.changed, found.warnings
+
+
+def rectified(reading, weights, density, first):
+    found = rectify_islands([reading])
+    return found.corners[0], found.uv[0], found.changed, found.warnings
+
+
 def measured(reading, weights, density, first):
     (worst,) = worst_faces([reading], "SHEAR", 0.2)
     # The first corner of each names the polygon.
@@ -120,7 +131,7 @@ def plain(thing):
 @pytest.mark.parametrize(
     ("closed", "action"),
     [(False, unwrapped), (True, cut_unwrapped), (True, projected), (False, magnified), (False, magnified_anew),
-     (False, refined), (False, scaled), (False, measured)],
+     (False, refined), (False, scaled), (False, stacked), (False, rectified), (False, measured)],
 )  # fmt: skip
 def test_what_is_not_chosen_changes_nothing(closed, action):
     alone, with_more = read(closed, False), read(closed, True)

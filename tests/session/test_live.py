@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 
@@ -24,6 +25,20 @@ def session(package):
     yield start
     for each in made:
         each.close()
+
+
+def test_what_follows_is_closed_once_by_whoever_ends_it(package):
+    following, closed, kept = package("session.following"), [], []
+    live = SimpleNamespace(close=lambda: closed.append(live))
+    following.begin(live, kept.append)
+    following.keep("a context")
+    assert kept == ["a context"] and not closed and following.current is live
+    following.end()
+    assert closed == [live] and following.current is None
+    # Nothing is on any more.
+    following.end()
+    following.keep("another")
+    assert closed == [live] and kept == ["a context"]
 
 
 def test_it_comes_to_rest_and_gives_back_every_bit(session):
