@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+import pytest
 import scenes
 
 
@@ -22,6 +23,34 @@ def test_the_command_marks_what_the_operator_marks(run, tmp_path):
     assert (status, err) == (0, "")
     assert seams_of(bpy.data.objects["Cube"]) == expected
     assert out.startswith(f"Cube: {sum(expected)} edges of seam, ")
+
+
+@pytest.mark.parametrize("what", ["pins", "group"])
+def test_what_cuts_avoid_they_avoid_here_and_there(run, tmp_path, what):
+    """Pins of the UVs, and a group that is named: the cut that would come without them goes elsewhere, both times the
+    same way."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8)
+    obj = bpy.context.object
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    assert bpy.ops.uv.omt_seams() == {"FINISHED"}
+    before = seams_of(obj)
+    inner = sorted({v for edge in obj.data.edges if edge.use_seam for v in edge.vertices})
+    for edge in obj.data.edges:
+        edge.use_seam = False
+    if what == "pins":
+        scenes.pin(obj, inner)
+    else:
+        obj.vertex_groups.new(name="free").add(inner, 1.0, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    free = "free" if what == "group" else ""
+    assert bpy.ops.uv.omt_seams(keep_free=free) == {"FINISHED"}
+    expected = seams_of(obj)
+    met = {v for edge in obj.data.edges if edge.use_seam for v in edge.vertices} & set(inner)
+    assert expected != before and len(met) < len(inner)
+    given = ("--keep-free", free) if free else ()
+    status, _, err = run("seams", tmp_path / "in.blend", "-o", tmp_path / "out.blend", *given)
+    assert (status, err) == (0, "")
+    assert seams_of(bpy.data.objects[obj.name]) == expected
 
 
 def test_files_that_lose_seams_and_groups_that_are_not_there_are_refused(run, tmp_path):

@@ -20,6 +20,13 @@ def test_ours_are_found_and_apply(package):
                 assert got == (pytest.approx(value) if isinstance(value, float) else value), name
 
 
+def test_a_preset_that_is_chosen_is_told_by_its_name(package, capfd):
+    for path in package("session.presets").files("uv.omt_unwrap"):
+        assert bpy.ops.uv.omt_preset(filepath=str(path)) == {"FINISHED"}
+        told = capfd.readouterr().out
+        assert f"Info: {path.stem}: the settings are chosen, nothing has been unwrapped yet" in told
+
+
 def test_nothing_in_a_preset_is_run(package, tmp_path):
     path = tmp_path / "bad.py"
     path.write_text("import bpy\nop = bpy.context.active_operator\nop.margin = 8\nop.unknown = 1\n")
