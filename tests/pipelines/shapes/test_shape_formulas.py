@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import meshes
 import numpy as np
@@ -197,6 +198,40 @@ def test_marks_are_on_the_pieces_of_the_edges_that_had_them_and_cells_end_at_sea
     for j, length in lengths.items():
         assert length == pytest.approx(np.linalg.norm(V[edges[j, 0]] - V[edges[j, 1]]))
     assert {e for e, c in cells.items() if len(c) > 1} <= {frozenset(e) for e in got.edges.tolist()}
+
+
+@pytest.mark.parametrize("named", [0, 1, 4])
+@pytest.mark.parametrize("meeting", [None, 0, 3])
+def test_the_report_of_a_match_tells_of_each_landmark_and_how_many_are_met(named, meeting):
+    """Those of a file of pairs have numbers in place of names."""
+    met, off = np.array([True, False, True, False]), np.array([0.25, 0.5, 0.125, 0.0625])
+    stretches = np.stack([np.arange(101.0), 2 * np.arange(101.0)], axis=1)
+    found = SimpleNamespace(domain="sphere", flipped=0.75, residuals=off, met=met, stretches=stretches, steps=(3, 5))
+    histogram = np.array([0.12345678, 0.5])
+    figures = SimpleNamespace(mean_curvature=0.3, curvature=histogram, mean_area=1.7, area=2 * histogram)
+    names = tuple("abcd"[:named])
+
+    class Landmarks(tuple):
+        pass
+
+    landmarks = Landmarks(range(4))
+    landmarks.names = names
+    result = match.MatchResult(None, None, None, (), found, landmarks, figures, ("a", "b"), meeting)
+    vars(result)["fit"] = 0.0625
+    told = result.report()
+    assert told.pop("landmarks") == dict(zip([*names, *"0123"[named:]], off.tolist(), strict=True))
+    assert told.pop("intersections", None) == meeting
+    assert told == {
+        "domain": "sphere",
+        "flipped_area": 0.75,
+        "met": 2,
+        "stretch_99": [99.0, 198.0],
+        "curvature_difference": {"mean": 0.3, "histogram": [0.123457, 0.5]},
+        "area_distortion": {"mean": 1.7, "histogram": [0.246914, 1.0]},
+        "fit_rms": 0.0625,
+        "steps": [3, 5],
+        "warnings": ["a", "b"],
+    }
 
 
 def off(p, a, b):

@@ -170,6 +170,18 @@ def test_a_ring_through_a_polygon_is_none():
     assert ring not in rows[np.unique(ring_edges(V, F, owner))]
 
 
+@pytest.mark.parametrize("which", range(0, SIDES, 5))
+def test_a_ring_that_lacks_an_edge_is_none(which):
+    """As where there is a hole: what is left of the row closes up no more, and another one is cut."""
+    V, P = tyre()
+    F, owner = polygons.cut(P)
+    usual, rows = ring_edges(V, F, owner), profile_here(V, F, owner).row
+    lacking = usual[rows[usual[:, 0]] == rows[usual[0, 0]]][which]
+    found = ring_edges(V, F, owner, without=lacking)
+    assert len(found) and rows[lacking[0]] not in rows[np.unique(found)]
+    assert len(found) % SIDES == 0
+
+
 def test_a_torus_comes_in_two_halves_with_straight_seams():
     """One click: one ring, and two ways around the tube, about opposite each other."""
     V, F = meshes.torus(48, 12, 0.25)
