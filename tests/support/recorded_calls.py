@@ -183,7 +183,7 @@ def _waves() -> np.ndarray:
 def _fewer(leaf: np.ndarray) -> np.ndarray:
     """The numbers of an array in a row; of many, as of a picture, sums of some each."""
     flat = leaf.ravel()
-    if flat.dtype.char not in "dD":
+    if flat.dtype.char not in "dD" or not flat.dtype.isnative:
         flat = flat.astype(complex if flat.dtype.kind == "c" else float)
     many = 1 + flat.size // SAMPLED
     if many == 1:
@@ -196,7 +196,7 @@ def _fewer(leaf: np.ndarray) -> np.ndarray:
 
 def _kind(leaf: np.ndarray) -> float:
     """A figure of the kind of numbers that an array holds, and of its shape: 0 for a row of numbers of full length."""
-    kind = KINDS.get(leaf.dtype.kind, 0.23 * (leaf.dtype.char == "f"))
+    kind = KINDS.get(leaf.dtype.kind, 0.23 * (leaf.dtype.char == "f" and leaf.dtype.isnative))
     return kind + sum(0.03 * axis * n for axis, n in enumerate(leaf.shape)) if leaf.ndim > 1 else kind
 
 
