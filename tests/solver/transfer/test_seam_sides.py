@@ -74,6 +74,30 @@ def test_corners_are_on_the_side_of_their_face():
         np.testing.assert_array_equal(mine[:, None] == mine, at[:, None] == at)
 
 
+def test_a_corner_on_a_seam_has_a_side_also_where_the_walk_to_it_gets_stuck():
+    """From the one arm of a U to the other there is a way, but none that comes nearer all the time."""
+    V, F = meshes.grid(8, 8)
+    middle = V[F].mean(axis=1)
+    F = F[(np.abs(middle[:, 0] - 0.5) > 0.13) | (middle[:, 1] < 0.3)]
+    used, F = np.unique(F, return_inverse=True)
+    V, F = np.column_stack([V[used, :2], np.zeros(len(used))]), F.reshape(-1, 3)
+    line = np.flatnonzero(np.isclose(V[:, 0], 0.875) & (V[:, 1] > 0.4) & (V[:, 1] < 0.9))
+    line = line[np.argsort(V[line, 1])]
+    mesh = cut_open(V, F, np.column_stack([line[:-1], line[1:]]))
+    faces, barycentric = in_corners(F, len(V))
+    free = ~on_seam(mesh, faces, barycentric)
+    asked = np.flatnonzero(np.isin(F, line[1:-1]).any(axis=1))
+    far = np.linalg.norm(V[F].mean(axis=1) - [0.2, 0.8, 0], axis=1).argmin()
+    start = np.arange(len(F))
+    start[asked] = far
+    triangle, weights, side, extended = locate_corners(mesh, F, start, free, V, faces, barycentric)
+    assert extended == 0
+    np.testing.assert_allclose(np.einsum("tkc,tkcj->tkj", weights, V[F[triangle]]), V[F], atol=1e-12)
+    inner = np.isin(F, line[1:-1])
+    assert inner[asked].any() and (side[inner] >= 0).all()
+    np.testing.assert_array_equal(side[free[F]], -1)
+
+
 def test_a_wall_that_stands_on_a_plate_unjoined_has_its_own_values():
     plate, F = meshes.grid(4, 4)
     plate = np.column_stack([plate[:, :2], np.zeros(len(plate))])
