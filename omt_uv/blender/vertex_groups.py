@@ -102,7 +102,7 @@ def write_group(obj: bpy.types.Object, name: str, weights: np.ndarray) -> None:
     order = np.argsort(weights, kind="stable")
     order = order[weights[order] > 0]
     values, first = np.unique(weights[order], return_index=True)
-    for value, members in zip(values.tolist(), np.split(order, first[1:]), strict=True):
+    for value, members in zip(values.tolist(), np.split(order, first)[1:], strict=True):
         group.add(members.tolist(), value, "REPLACE")
     obj.data.update()
 

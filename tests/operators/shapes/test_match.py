@@ -62,6 +62,17 @@ def test_everything_arrives_on_the_other_mesh(package):
     assert rows["Landmarks met"] == "5 of 5" and rows["Flipped"] == "0 %"
 
 
+def test_a_group_of_no_vertex_arrives_as_one():
+    source, target, _ = pair()
+    source.vertex_groups.new(name="empty")
+    taken = target.vertex_groups.new(name="emptied")
+    taken.add([0, 1, 2], 0.5, "REPLACE")
+    source.vertex_groups.new(name="emptied")
+    match()
+    assert not weights(target, "empty").any() and not weights(target, "emptied").any()
+    assert weights(target, "up").any()
+
+
 def test_only_what_is_chosen_is_transferred():
     source, target, _ = pair()
     match(transfer={"GROUPS"})
