@@ -16,14 +16,14 @@ def test_colours_leave_no_trace(package, own, mode):
         obj.data.color_attributes.active_color = obj.data.color_attributes["Mine"]
     if mode == "EDIT":
         scenes.edit(obj)
-    before = scenes.state(obj)
+    before, more = scenes.state(obj), dict(obj.data.items())
     for value in (0.2, 0.8):
         colours.write_colours(obj, np.arange(8), np.full((8, 3), value))
         assert colours.has_colours(obj.data)
         assert obj.data.color_attributes.active_color.name == colours.ATTRIBUTE
     colours.remove_colours(obj)
     assert not colours.has_colours(obj.data)
-    assert scenes.state(obj) == before
+    assert scenes.state(obj) == before and dict(obj.data.items()) == more
     assert (obj.data.color_attributes.active_color.name if own else "Mine") == "Mine"
 
 

@@ -14,9 +14,10 @@ def test_what_is_written_is_read(package, mode):
     weights[::3] = 0
     if mode == "EDIT":
         scenes.edit(obj)
-    # Twice: the second time the group is there, with other weights in it.
-    groups.write_group(obj, "heat", weights[::-1].copy())
-    groups.write_group(obj, "heat", weights)
+    # Twice: the second time the group is there, with other weights in it. Whichever was written is the active one.
+    for name, values in (("heat", weights[::-1].copy()), ("cold", 0 * weights), ("heat", weights)):
+        groups.write_group(obj, name, values)
+        assert obj.vertex_groups.active.name == name
     assert (groups.group_weights(obj, "heat") == weights).all()
     assert groups.group_weights(obj, "none") is None
     if mode == "EDIT":
