@@ -40,3 +40,16 @@ def test_a_diagram_is_a_mesh_beside_its_object():
     area = sum(p.area for p in made.data.polygons)
     assert area == pytest.approx(1, abs=1e-4)
     assert "not closed" in scenes.error_of(bpy.ops.object.omt_diagram, domain="SPHERE")
+
+
+@pytest.mark.parametrize("active", ["A", "B"])
+@pytest.mark.parametrize("made_first", ["A", "B"])
+def test_the_diagram_of_several_is_that_of_the_active_one(active, made_first):
+    counts = {"A": (4, 3), "B": (5, 4)}
+    for name in sorted(counts, reverse=made_first == "B"):
+        scenes.bump(*counts[name], name=name, offset=2.0 * (name == "B"))
+    scenes.select([obj for obj in bpy.data.objects if obj.name != active] + [bpy.data.objects[active]])
+    before = set(bpy.data.objects)
+    assert bpy.ops.object.omt_diagram(domain="SQUARE") == {"FINISHED"}
+    (made,) = set(bpy.data.objects) - before
+    assert made.name == f"{active}_cells" and len(made.data.polygons) == len(bpy.data.objects[active].data.vertices)
