@@ -69,3 +69,9 @@ def test_a_polygon_goes_where_its_first_triangle_goes(monkeypatch, backwards):
             if len(common) == 2 and chart[f] != chart[g]:
                 expected.add(frozenset(map(int, common)))
     assert seams == expected and expected
+
+
+def test_a_mesh_in_a_point_has_no_seams_and_no_number_is_divided_by_its_size():
+    V, F = meshes.icosphere(1)
+    with np.errstate(all="raise"):
+        assert len(chart_seams(triangle_surface(0 * V + [3.0, 4.0, 5.0], F))) <= 3 * len(F) // 2

@@ -29,6 +29,16 @@ def row(name, state="done", **more):
     return {**plain, **more}
 
 
+@pytest.mark.parametrize("first", ["=", "+", "-", "@", "\t", "a", "'", " ="])
+def test_no_name_is_a_formula_in_a_table(package, first):
+    """What a program for tables would work out is quoted; numbers, also negative ones, stay numbers."""
+    tables = package("batch.tables")
+    name = f"{first}1+1"
+    (read,) = csv.DictReader(io.StringIO(tables.csv_text([row(name, seconds=-2.5)]), newline=""))
+    assert read["name"] == (f"'{name}" if first in ("=", "+", "-", "@", "\t") else name)
+    assert read["seconds"] == "-2.5"
+
+
 def test_parts_of_a_file_are_one_row(package):
     figures = package("batch.figures").figures_of(json.dumps(REPORT))
     assert figures == {"gate.overlap": 0.25, "charts": 2, "faces": 40, "folds": 2, "seconds.packing": 2.0,
