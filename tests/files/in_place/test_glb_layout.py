@@ -82,7 +82,7 @@ def test_values_that_end_where_the_file_ends_are_read_and_one_byte_fewer_is_none
         found = glb_data.accessor(whole, 0)
         assert found.shape == (count, width) and found.tobytes() == read(whole, 0).tobytes()
         if count:
-            with pytest.raises(InPlaceError, match="leads out of the file"):
+            with pytest.raises(InPlaceError, match=r"leads out of the file|counts \d+ values"):
                 glb_data.accessor(Glb(doc, raw.tobytes()[:-1], []), 0)
 
 
