@@ -77,6 +77,14 @@ def polygon_sides(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.column_stack([tail[side], head[side]])
 
 
+def distances(outlined: Outlined) -> np.ndarray:
+    """How far vertices are from their mean (n,), in order: no motion changes it."""
+    # Squares of huge coordinates would be infinite.
+    unit = float(np.abs(outlined.vertices).max()) or 1.0
+    at = outlined.vertices / unit
+    return np.sort(lengths(at - at.mean(axis=0))) * unit
+
+
 def motion(first: Outlined, other: Outlined) -> tuple[np.ndarray, float] | None:
     """The vertex (n,) of the first for each of the other one's, if a motion takes one to the other, and 1.0, or -1.0 if
     it is a mirrored one; None if there is none. Vertices that lie upon one another are told by their sides.

@@ -39,6 +39,8 @@ WORTHWHILE = 0.03
 HOPES = (1.0, 0.5)
 # What misses the bound by less may keep it with areas that are no more exact than is promised.
 SPARED = 0.05
+# That is tried again where no more than so many times of what it was good for the last time is missing.
+HOPEFUL = 2.0
 # Of what came apart parts with this share of the area are searched anew, unless they lie flat: a shorter cut would go
 # across what does along its edges.
 LARGE_PART = 0.03
@@ -60,6 +62,8 @@ SEARCHING = 0.25
 PARTING = 0.3
 # What misses the bound whatever is cut comes apart in two so many times.
 MOST_HALVINGS = 3
+# At first only what misses its areas by more, far more than is promised.
+STUCK = 0.1
 # Charts that are joined again, at the end.
 JOINING = 0.05
 
@@ -141,8 +145,9 @@ def _further_rounds(
     search: ShearSearch, begun: Round, map_charts, crossing, map_sparing, early: EarlyEnd
 ) -> Steps[Round]:
     """The best of the rounds after a first one, see `bound_shear`; made shorter where it keeps the bound."""
-    best = last = begun
+    best = last = begun = yield from part_of(_in_halves(search, begun, map_charts, early, stuck=True), 0.0, 0.0)
     spread, promised, crossed = search.first_spread(), np.full(search.count, np.inf), False
+    gained = np.inf
     tried, worse, rehearsed = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]](), dict[str, Any]()
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
@@ -153,12 +158,13 @@ def _further_rounds(
         begin, width = 1 - 0.5 ** (rounds - 1), 0.5**rounds
         if not last.searched:
             break
-        if (last.mean <= (1 + NEARLY) * last.bound).all():
+        if last.excess <= HOPEFUL * gained and (last.mean <= (1 + NEARLY) * last.bound).all():
             # What is steep alone, as single triangles of a coarse mesh are, need not be slit, and what misses the bound
             # by little not be searched.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
                 return spared
+            gained = last.excess - spared.excess
         is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
         parting = part_of(come_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
         parts = yield from unless_ended(parting, early)
@@ -255,13 +261,20 @@ def _along_all_creases(search: ShearSearch, last: Round, map_charts, early: Earl
     return last if new is None or new.excess >= last.excess else new
 
 
-def _in_halves(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
-    """A round whose charts that miss the bound by much come apart in two, again where that was of help: nothing else
-    was. Where something is to be kept free of cuts they stay whole."""
+def _is_stuck(chart_map: ChartMap) -> bool:
+    """Whether a map is far from its areas although it took all steps that it may: its boundary is in its own way, and
+    longer cuts are no help."""
+    return chart_map.status == "steps" and STUCK < chart_map.area_l1 < np.inf
+
+
+def _in_halves(search: ShearSearch, last: Round, map_charts, early: EarlyEnd, stuck: bool = False) -> Steps[Round]:
+    """A round whose charts that miss the bound by much, or those of them whose maps are stuck, come apart in two, again
+    where that was of help: nothing else was. Where something is to be kept free of cuts they stay whole."""
     from ..seams.parting import halves
 
     for _ in range(MOST_HALVINGS):
         missed = [k for k in last.searched if last.mean[k] > (1 + NEARLY) * last.bound]
+        missed = [k for k in missed if not stuck or _is_stuck(last.maps[k])]
         if not missed or search.cutting.get("avoid") is not None:
             break
         edges = [halves(last.charts[k], search.costs().vertex_cost) for k in missed]

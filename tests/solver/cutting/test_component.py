@@ -8,7 +8,9 @@ import pytest
 from short_cuts import component_of, gluing_of
 
 from omt_uv.solver.analysis.seam_costs import seam_costs
+from omt_uv.solver.cutting import component as component_module
 from omt_uv.solver.cutting.component import Copies, TurnedCopies, boundary_vertices, classify, fingerprint, fold_angles
+from omt_uv.solver.cutting.component_order import Outlined, distances, motion
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.gluing import components, corner_classes
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -128,6 +130,36 @@ def test_copies_that_are_turned_have_the_same_edges(sign):
     assert copies.of(component_of(W + 1e-3 * np.eye(len(V), 3), F)) is None
     assert copies.of(replace(copy, cost=2 * copy.cost)) is None
     assert copies.of(replace(copy, avoid=copy.avoid + (np.arange(len(V)) == 3))) is None
+
+
+def test_no_motion_is_looked_for_between_what_is_only_nearly_alike(monkeypatch):
+    V, F = meshes.bumpy(5, 4)
+    V[:, 2] += 0.1 * V[:, 0] ** 2 + 0.05 * V[:, 0] * V[:, 1]
+    rng, copies, looked = np.random.default_rng(2), TurnedCopies(), []
+    parts = [component_of(V + 1e-4 * rng.normal(size=V.shape), F) for _ in range(40)]
+    monkeypatch.setattr(component_module, "motion", lambda a, b: looked.append(a) or motion(a, b))
+    for part in parts:
+        assert copies.of(part) is None
+        copies.tell(part, np.zeros(len(part.pair), bool))
+    names = [len(found) for found in copies.known.values()]
+    assert not looked and max(names) > 5 and sum(names) == 40
+    for k in (0, 20, 39):
+        other, *_ = copies.of(component_of(turned_by(parts[k].positions, k), parts[k].triangles))
+        assert other is parts[k]
+    assert len(looked) == 3
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e160, 1e-160])
+def test_distances_from_the_middle_are_those_of_any_motion(scale):
+    V, F = meshes.bumpy(5, 4)
+    sides = F[:, :2]
+    found = [
+        distances(Outlined(scale * x, sides)) for x in (V, turned_by(V, 3)[::-1], turned_by(V, 4, -1.0) + [3, 1, 2])
+    ]
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=1e-9)
+    centre = V.mean(axis=0)
+    np.testing.assert_allclose(found[0] / scale, np.sort(np.linalg.norm(V - centre, axis=1)), rtol=1e-9)
 
 
 def test_parts_that_are_turned_are_searched_once(monkeypatch):

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import meshes
 import numpy as np
 import pytest
+from scripted_steps import worked
 
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.straight_paths import TURN
@@ -428,6 +429,30 @@ def test_what_misses_its_bound_by_much_comes_apart_in_halves_as_often_as_that_he
     # Not where anything is to be kept free.
     search.cutting["avoid"] = np.zeros(3)
     assert drain(shear_bound._in_halves(search, rounds[0], None, EarlyEnd())) is rounds[0]
+
+
+@pytest.mark.parametrize(
+    ("status", "area_error", "halved"),
+    [("steps", 0.11, True), ("steps", 0.09, False), ("steps", np.inf, False), ("converged", 0.5, False)],
+)
+def test_only_maps_that_took_all_steps_and_are_far_from_their_areas_are_halved_at_first(
+    status, area_error, halved, monkeypatch
+):
+    first, made = round_of([1, 1], [1.5, 1.5]), round_of([1, 1], [1.3, 1.5])
+    first.maps[:] = [
+        SimpleNamespace(status=status, area_l1=area_error),
+        SimpleNamespace(status="converged", area_l1=0.2),
+    ]
+    asked = []
+    monkeypatch.setattr(shear_bound, "_cut_anew", lambda search, last, task, *_: worked(asked.append(task) or made))
+    monkeypatch.setattr(parting, "halves", lambda chart, cost: np.array([[chart.faces[0], cost]]))
+    monkeypatch.setattr(shear_bound.Round, "kept", lambda self, chosen: np.array([[7, 8]]))
+    made.maps[:] = [SimpleNamespace(status="converged", area_l1=0.0)] * 2
+    costs = SimpleNamespace(vertex_cost=9)
+    search = SimpleNamespace(first_spread=lambda: "spread", costs=lambda: costs, cutting={})
+    found = drain(shear_bound._in_halves(search, first, None, EarlyEnd(), stuck=True))
+    assert [task.charts for task in asked] == ([[0]] if halved else [])
+    assert found is (made if halved else first)
 
 
 @pytest.mark.parametrize(

@@ -336,7 +336,12 @@ def made_round(search, edges, shear, found):
     charts = strict_charts(replace(surface, seams=edges))
     maps = [
         SimpleNamespace(
-            uv=c.vertices[:, :2] * [np.sqrt(s), 1 / np.sqrt(s)], angle_mean=s, area_l1=0, folds=0, failure=None
+            uv=c.vertices[:, :2] * [np.sqrt(s), 1 / np.sqrt(s)],
+            angle_mean=s,
+            area_l1=0,
+            folds=0,
+            failure=None,
+            status="converged",
         )
         for c, s in zip(charts, shear, strict=True)
     ]

@@ -71,7 +71,11 @@ def bounded(monkeypatch):
 
     def run(*rounds, apart=(), crossed=(), spared=None, crossing="crossing", stop=None, ask_end=None, **given):
         asked, rest, parts, crossings = [], list(rounds[1:]), list(apart), list(crossed)
-        joined = []
+        joined, halved = [], []
+
+        def halves(search, last, map_charts, early, stuck):
+            halved.append((last.name, stuck))
+            return worked(last)
 
         def first(search, prepared, maps, map_charts, free, early):
             asked.append(("first", free))
@@ -121,6 +125,7 @@ def bounded(monkeypatch):
         monkeypatch.setattr(shear_bound, "_with_areas_spared", spare)
         monkeypatch.setattr(shear_bound, "_made_shorter", shorter)
         monkeypatch.setattr(shear_bound, "_joined_again", again)
+        monkeypatch.setattr(shear_bound, "_in_halves", halves)
         monkeypatch.setattr(shear_bound, "JOINING", 0.0)
         monkeypatch.setattr(shear_bound, "_result", lambda best, search, warnings, early: (best.name, early.is_asked))
         search = SimpleNamespace(first_spread=lambda: np.array([8.0]), count=1)
@@ -133,6 +138,7 @@ def bounded(monkeypatch):
             found = stop.value
         # Charts are joined at the very end, of what there is then, unless somebody waits for it.
         assert joined == ([] if found[1] else [(rounds[0].name, found[0])])
+        assert halved == [(rounds[0].name, True)]
         # A round that is broken off is done anew by what makes the best shorter.
         assert min(fractions) >= 0 and max(fractions) <= 1 + 1e-9
         return found, asked, fractions
@@ -148,7 +154,7 @@ def test_what_keeps_the_bound_is_only_made_shorter(bounded):
     found, asked, fractions = bounded(Made("first"))
     assert found == ("first", False) and asked == [("first", True), ("shorter", "first")]
     assert bounded(Made("first"), crossing=None)[1][0] == ("first", False)
-    assert fractions == pytest.approx([0, 0, 0, 1])
+    assert fractions == pytest.approx([0, 0, 0, 0, 0, 1])
 
 
 def test_rounds_go_on_until_the_bound_is_kept(bounded):
@@ -171,7 +177,7 @@ def test_rounds_go_on_until_the_bound_is_kept(bounded):
     assert margins == pytest.approx([shear_bound.MARGIN, shear_bound.MARGIN**0.5])
     assert [r.shares_asked[0][1] for r in rounds[:2]] == [[np.inf], [0.25]]
     # Every round takes half of what is left, the last what the search for shorter cuts does.
-    assert fractions[2:6] == pytest.approx([0, 0.15, 0.15, 0.5]) and fractions[-2:] == pytest.approx([0.75, 1.0])
+    assert fractions[4:8] == pytest.approx([0, 0.15, 0.15, 0.5]) and fractions[-2:] == pytest.approx([0.75, 1.0])
 
 
 def test_no_more_than_so_many_rounds(bounded):
@@ -230,6 +236,14 @@ def test_what_is_steep_alone_is_spared_where_areas_may_be_less_exact(bounded):
     found, asked, _ = bounded(Made("first", 3.0, mean_missed=False), Made("second"), spared=Made("spared"))
     assert found == ("spared", False) and not names(asked, "cut")
     assert not names(bounded(Made("first", 3.0), Made("second", 2.0), Made("third"))[1], "spared")
+
+
+def test_areas_are_spared_again_where_that_gained_half_of_what_is_missing(bounded):
+    rounds = [Made(str(k), missing, mean_missed=False) for k, missing in enumerate((3.0, 2.0, 1.0))]
+    for left, again in ((2.9, ["0"]), (2.5, ["0", "2"]), (2.0, ["0", "1"])):
+        found, asked, _ = bounded(*rounds, Made("3"), spared=Made("spared", left))
+        # The second time it has gained nothing.
+        assert names(asked, "spared") == again and found == ("3", False)
 
 
 def test_an_end_that_is_asked_for_keeps_the_best_as_it_is(bounded):
