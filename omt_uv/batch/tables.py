@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from .figures import columns_of, flat_row
@@ -23,11 +23,18 @@ def table_of(rows: Sequence[dict]) -> tuple[list[str], list[dict[str, object]]]:
 def csv_text(rows: Sequence[dict]) -> str:
     """The table as CSV, with a line of names first; a text that a spreadsheet would run gets an apostrophe."""
     columns, flat = table_of(rows)
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_cell(row.get(name)) for name in columns] for row in flat)
-    return out.getvalue()
+    return csv_lines([columns, *([_cell(row.get(name)) for name in columns] for row in flat)])
+
+
+def csv_lines(rows: Iterable[Sequence[object]]) -> str:
+    """Rows of values as lines of CSV."""
+    lines = []
+    for row in rows:
+        out = io.StringIO()
+        # What is quoted depends on how lines end: a name may have either half of such an end in it.
+        csv.writer(out).writerow(row)
+        lines.append(out.getvalue().removesuffix("\r\n"))
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _cell(value: object) -> object:

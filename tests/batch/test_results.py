@@ -39,6 +39,14 @@ def test_no_name_is_a_formula_in_a_table(package, first):
     assert read["seconds"] == "-2.5"
 
 
+@pytest.mark.parametrize("inside", ["\r", "\n", "\r\n", ",", '"'])
+def test_a_name_with_the_end_of_a_line_in_it_is_one_row(package, inside):
+    tables = package("batch.tables")
+    text = tables.csv_text([row(f"a{inside}b"), row(f"x{inside}c{inside}")])
+    first, second = csv.DictReader(io.StringIO(text, newline=""))
+    assert (first["name"], second["name"]) == (f"a{inside}b", f"x{inside}c{inside}") and text.endswith("\n")
+
+
 def test_parts_of_a_file_are_one_row(package):
     figures = package("batch.figures").figures_of(json.dumps(REPORT))
     assert figures == {"gate.overlap": 0.25, "charts": 2, "faces": 40, "folds": 2, "seconds.packing": 2.0,

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 from ... import __version__
+from ...batch.tables import csv_lines
 from ..common import CommandError, UsageError, write_picture
 from ..options import number
 from .distance import add_points
@@ -64,13 +65,8 @@ def run(options: argparse.Namespace) -> None:
     index = read_index(options.input if options.input.suffix.lower() == ".npz" else _indexed(options))
     classes, owners = (None, None) if options.labels is None else _classes(options.labels, index.names)
     found = _matrix(options, index)
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(["", *index.names])
-    writer.writerows(
-        [name, *(f"{value:.6g}" for value in row)] for name, row in zip(index.names, found[0], strict=True)
-    )
-    write_text(options.output, table.getvalue())
+    table = [[name, *(f"{value:.6g}" for value in row)] for name, row in zip(index.names, found[0], strict=True)]
+    write_text(options.output, csv_lines([["", *index.names], *table]))
     print(f"{len(index)} shapes, {len(index) * (len(index) - 1) // 2} distances in {options.output}")
     _draw(options, found, index.names, classes)
     if options.knn and classes is not None:
