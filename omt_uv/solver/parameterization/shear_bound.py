@@ -39,8 +39,6 @@ WORTHWHILE = 0.03
 HOPES = (1.0, 0.5)
 # What misses the bound by less may keep it with areas that are no more exact than is promised.
 SPARED = 0.05
-# That is tried again where no more than so many times of what it was good for the last time is missing.
-HOPEFUL = 2.0
 # Of what came apart parts with this share of the area are searched anew, unless they lie flat: a shorter cut would go
 # across what does along its edges.
 LARGE_PART = 0.03
@@ -147,7 +145,6 @@ def _further_rounds(
     """The best of the rounds after a first one, see `bound_shear`; made shorter where it keeps the bound."""
     best = last = begun = yield from part_of(_in_halves(search, begun, map_charts, early, stuck=True), 0.0, 0.0)
     spread, promised, crossed = search.first_spread(), np.full(search.count, np.inf), False
-    gained = np.inf
     tried, worse, rehearsed = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]](), dict[str, Any]()
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
@@ -158,13 +155,12 @@ def _further_rounds(
         begin, width = 1 - 0.5 ** (rounds - 1), 0.5**rounds
         if not last.searched:
             break
-        if last.excess <= HOPEFUL * gained and (last.mean <= (1 + NEARLY) * last.bound).all():
+        if (last.mean <= (1 + NEARLY) * last.bound).all():
             # What is steep alone, as single triangles of a coarse mesh are, need not be slit, and what misses the bound
             # by little not be searched.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
                 return spared
-            gained = last.excess - spared.excess
         is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
         parting = part_of(come_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
         parts = yield from unless_ended(parting, early)

@@ -238,14 +238,6 @@ def test_what_is_steep_alone_is_spared_where_areas_may_be_less_exact(bounded):
     assert not names(bounded(Made("first", 3.0), Made("second", 2.0), Made("third"))[1], "spared")
 
 
-def test_areas_are_spared_again_where_that_gained_half_of_what_is_missing(bounded):
-    rounds = [Made(str(k), missing, mean_missed=False) for k, missing in enumerate((3.0, 2.0, 1.0))]
-    for left, again in ((2.9, ["0"]), (2.5, ["0", "2"]), (2.0, ["0", "1"])):
-        found, asked, _ = bounded(*rounds, Made("3"), spared=Made("spared", left))
-        # The second time it has gained nothing.
-        assert names(asked, "spared") == again and found == ("3", False)
-
-
 def test_an_end_that_is_asked_for_keeps_the_best_as_it_is(bounded):
     found, asked, _ = bounded(Made("first", 3.0), Made("second", 2.0), None, ask_end=2)
     assert found == ("second", True) and not names(asked, "shorter")
