@@ -226,7 +226,8 @@ def _first_round(
         return first
     of, count = first.chart_of(search, new), len(first.charts)
     left = np.bincount(of, new.area * np.log(new.mean), count) > LEFT * first.area * np.log(first.mean)
-    stay = left | (np.bincount(of, new.missing, count) > first.missing)
+    # What misses the bound in any case is cut further, in parts that need little of it.
+    stay = left | ((np.bincount(of, new.missing, count) > first.missing) & (first.missing == 0))
     return first if stay.all() else first.merged(search, new, of, stay)
 
 

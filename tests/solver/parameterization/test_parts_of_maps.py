@@ -496,6 +496,32 @@ def test_shorter_cuts_are_taken_where_they_keep_the_bound(outcomes, kept, monkey
         assert what.is_worth(np.array([[0, 1]])) and not what.is_worth(np.array([[0, 1], [1, 2]] * 2))
 
 
+@pytest.mark.parametrize(
+    ("mean", "small", "stays"), [(1.4, 0.05, False), (1.3, 0.05, True), (1.4, 0.2, True), (1.3, 0.0, False)]
+)
+def test_flat_sides_part_where_the_bound_is_missed_though_what_is_left_misses_it_by_more(
+    mean, small, stays, monkeypatch
+):
+    """A small piece that shears by 6 is cut further, instead of the whole around it; what kept the bound stays."""
+    first = round_of([1, 1], [mean, 1.2])
+    charts = [SimpleNamespace(faces=np.array([k])) for k in (0, 0, 1)]
+    new = round_of([1 - small, small, 1], [1.0, 6.0 if small else 1.0, 1.2], charts=charts)
+    monkeypatch.setattr(shear_bound.Round, "of", staticmethod(lambda *_: first))
+    monkeypatch.setattr(shear_bound.Round, "kept", lambda self, chosen: np.zeros((0, 2), int))
+    monkeypatch.setattr(shear_bound.Round, "merged", lambda self, search, other, of, stay: stay.tolist())
+    monkeypatch.setattr(shear_bound, "but_within", lambda edges, charts: edges)
+    monkeypatch.setattr(parting, "flat_sides", lambda chart, sharp: np.array([[0, 1]])[: chart is first.charts[0]])
+    monkeypatch.setattr(shear_bound, "_cut_anew", lambda search, last, asked, *_: worked(new))
+    shear = SimpleNamespace(further=True)
+    search = SimpleNamespace(
+        cutting={}, target=None, shear=shear, memory={}, count=2, surface=None, first_spread=lambda: np.ones(2)
+    )
+    prepared = SimpleNamespace(charts=first.charts, found_cuts=first.cuts)
+    found = drain(shear_bound._first_round(search, prepared, first.maps, None, True, EarlyEnd()))
+    # The other chart has no flat sides, and is as it was whatever becomes of it.
+    assert found is first if stays else found[0] is False
+
+
 @pytest.mark.parametrize("settled", [[], [3]])
 def test_pieces_that_are_cut_further_stay_whole_in_the_first_round(settled):
     one = replace(round_of([1], [1.5]), settled=np.array(settled, np.int64))
