@@ -23,7 +23,7 @@ from ..mesh.geometry import (
 from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import first_places, graph_components, halfedges, pair_keys
 from ..quads.recombination import with_shorter_diagonals
-from .component_order import SAME_PLACE, Outlined, distances, in_order, motion
+from .component_order import SAME_PLACE, Outlined, in_order, motion
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
 # angle counts as these shares of its length. Shares near 1 keep cuts short: their length is bounded by them.
@@ -310,14 +310,11 @@ class TurnedCopies:
     one, too: wheels, screws, both hands."""
 
     known: dict[tuple[int, ...], list[tuple[CutComponent, Outlined, np.ndarray]]] = field(default_factory=dict)
-    far: dict[tuple[int, ...], list[np.ndarray]] = field(default_factory=dict)
 
     def tell(self, component: CutComponent, edges: np.ndarray) -> None:
         """Keep what was found for a component that is no copy."""
         mine = _outlined(component)
-        name = self._name(mine)
-        self.known.setdefault(name, []).append((component, mine, edges))
-        self.far.setdefault(name, []).append(distances(mine))
+        self.known.setdefault(self._name(mine), []).append((component, mine, edges))
 
     def found_for(self, component: CutComponent) -> np.ndarray | None:
         """What was found for a component that this one is a copy of; None where there is none."""
@@ -345,10 +342,9 @@ class TurnedCopies:
 
     def _like(self, mine: Outlined) -> Iterator[tuple[CutComponent, Outlined, np.ndarray]]:
         # Of thousands that are nearly alike hardly any is worth the search for a motion.
-        name, far = self._name(mine), distances(mine)
-        if name in self.known:
-            off = np.abs(np.stack(self.far[name]) - far).max(axis=1)
-            yield from (self.known[name][k] for k in np.flatnonzero(off <= 2 * SAME_PLACE * far[-1]))
+        if known := self.known.get(self._name(mine)):
+            off = np.abs(np.stack([its.distances for _, its, _ in known]) - mine.distances).max(axis=1)
+            yield from (known[k] for k in np.flatnonzero(off <= 2 * SAME_PLACE * mine.distances[-1]))
 
     def _name(self, outlined: Outlined) -> tuple[int, ...]:
         # Thousands of leaves of as many vertices are not compared with one another.

@@ -6,6 +6,7 @@ Ties between cuts are broken by numbers; so the order in which a file has its ve
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -66,6 +67,14 @@ class Outlined:
     vertices: np.ndarray
     sides: np.ndarray
 
+    @cached_property
+    def distances(self) -> np.ndarray:
+        """How far vertices are from their mean (n,), in order: no motion changes it."""
+        # Squares of huge coordinates would be infinite.
+        unit = float(np.abs(self.vertices).max()) or 1.0
+        at = self.vertices / unit
+        return np.sort(lengths(at - at.mean(axis=0))) * unit
+
 
 def polygon_sides(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """The sides (k,2) of triangles (m,3) that are no diagonals of their polygons (m,)."""
@@ -75,14 +84,6 @@ def polygon_sides(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
     _, place, count = np.unique(np.stack([low, high, faces]), axis=1, return_inverse=True, return_counts=True)
     side = count[place.ravel()] == 1
     return np.column_stack([tail[side], head[side]])
-
-
-def distances(outlined: Outlined) -> np.ndarray:
-    """How far vertices are from their mean (n,), in order: no motion changes it."""
-    # Squares of huge coordinates would be infinite.
-    unit = float(np.abs(outlined.vertices).max()) or 1.0
-    at = outlined.vertices / unit
-    return np.sort(lengths(at - at.mean(axis=0))) * unit
 
 
 def motion(first: Outlined, other: Outlined) -> tuple[np.ndarray, float] | None:
@@ -100,8 +101,7 @@ def motion(first: Outlined, other: Outlined) -> tuple[np.ndarray, float] | None:
     size = lengths(a).max()
     if not size > 0:
         return None
-    far = [np.sort(lengths(x)) for x in (a, b)]
-    if np.abs(far[0] - far[1]).max() > SAME_PLACE * size:
+    if np.abs(first.distances - other.distances).max() > SAME_PLACE * first.distances[-1]:
         return None
     a, b = _with_neighbours(a, sides_a), _with_neighbours(b, sides_b)
     there = cKDTree(b / size)

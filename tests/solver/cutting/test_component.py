@@ -10,7 +10,7 @@ from short_cuts import component_of, gluing_of
 from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting import component as component_module
 from omt_uv.solver.cutting.component import Copies, TurnedCopies, boundary_vertices, classify, fingerprint, fold_angles
-from omt_uv.solver.cutting.component_order import Outlined, distances, motion
+from omt_uv.solver.cutting.component_order import Outlined, motion
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.gluing import components, corner_classes
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -154,7 +154,7 @@ def test_distances_from_the_middle_are_those_of_any_motion(scale):
     V, F = meshes.bumpy(5, 4)
     sides = F[:, :2]
     found = [
-        distances(Outlined(scale * x, sides)) for x in (V, turned_by(V, 3)[::-1], turned_by(V, 4, -1.0) + [3, 1, 2])
+        Outlined(scale * x, sides).distances for x in (V, turned_by(V, 3)[::-1], turned_by(V, 4, -1.0) + [3, 1, 2])
     ]
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=1e-9)
