@@ -45,9 +45,11 @@ LARGER = 1.04
 EXACT = 1.004
 # A scale this much below the first one that was tried is none: the margins fill the square.
 LEAST_SCALE = 1e-3
-# Orders that are tried at a scale: what found no room comes first in the second and the third; others are by sizes
-# that chance has changed by about this much, as a logarithm.
+# Orders that are tried at a scale, at least, and of few items as many as take about so many places: what found no room
+# comes first in the second and the third; others are by sizes that chance has changed by about this much, as a
+# logarithm.
 ORDERS = 8
+PLACES_TRIED = 100
 STUCK_FIRST = 2
 CHANCE = 0.15
 # Of so many items or more, which take longer, only the first of them are, and those if this share of all cells found a
@@ -266,6 +268,7 @@ def _larger(found: _Found, most: float) -> Steps[_Found]:
     What is found is on the raster of the task of `found`, if anything is: otherwise it is what was given.
     """
     task, order, limit, best, others = found.task, found.order, most * found.scale, found, 0
+    orders = max(ORDERS, PLACES_TRIED // len(order))
     while EXACT * best.scale <= limit:
         step = LARGER
         while step > EXACT:
@@ -275,7 +278,7 @@ def _larger(found: _Found, most: float) -> Steps[_Found]:
             step = min(step, limit / best.scale)
         yield Progress("Packing", others / (others + 1))
         scale = EXACT * best.scale
-        new, order = (None, order) if scale > limit else _fit(task, scale, order, ORDERS)
+        new, order = (None, order) if scale > limit else _fit(task, scale, order, orders)
         if new is None:
             break
         best, order, others = new, new.order, others + 1

@@ -66,9 +66,20 @@ def test_other_orders_make_room_where_the_first_ones_do_not(monkeypatch):
     faces = [np.array([[0, 1, 2], [0, 2, 3]])] * 14
     more = np.array([pack(bars(seed), faces).coverage for seed in (0, 1, 5, 7)])
     monkeypatch.setattr(pack_square, "ORDERS", pack_square.STUCK_FIRST)
+    monkeypatch.setattr(pack_square, "PLACES_TRIED", 0)
     fewer = np.array([pack(bars(seed), faces).coverage for seed in (0, 1, 5, 7)])
     # What fits by chance leads elsewhere, and may end a little lower.
     assert (more >= fewer - 0.002).all() and more.mean() > fewer.mean() + 0.003
+
+
+@pytest.mark.parametrize("count", [2, 5, 9, 12, 13, 30])
+def test_of_few_islands_more_orders_are_tried(monkeypatch, count):
+    """About as many islands are placed for another order as of a dozen."""
+    asked, fit = [], pack_square._fit
+    monkeypatch.setattr(pack_square, "_fit", lambda *given: asked.append(given[-1]) or fit(*given))
+    pack(bars(3, count), [np.array([[0, 1, 2], [0, 2, 3]])] * count)
+    most = max(asked)
+    assert most == 8 if count > 12 else 100 - count < most * count <= 100
 
 
 def test_roughly_packed_islands_are_apart_and_fill_less(monkeypatch):

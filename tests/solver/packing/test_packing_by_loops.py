@@ -163,7 +163,7 @@ def test_larger_scales_are_tried_while_an_order_has_room_and_then_with_others(mo
     found = drain(pack_square._larger(start, most))
     end = min(room[-1], most)
     assert end / 1.0081 <= found.scale <= end and max(scale for scale, _ in tried) <= min(most, 1.04 * end)
-    assert {orders for _, orders in tried} == ({1} if most == 1.05 else {1, pack_square.ORDERS})
+    assert {orders for _, orders in tried} == ({1} if most == 1.05 else {1, pack_square.PLACES_TRIED})
     monkeypatch.setattr(pack_square, "_fit", lambda task, scale, order, orders: (None, order))
     assert drain(pack_square._larger(start, most)) is start
 
