@@ -355,8 +355,11 @@ def test_views_are_mentioned_wherever_they_stand():
         "accessors": [{"bufferView": 3}, {"sparse": {"indices": {"bufferView": 1}}}],
         "images": [{"bufferView": "x"}],
         "other": {"bufferView": 5, "list": [[{"bufferView": 7}]]},
+        "bufferViews": [{"extensions": {"EXT_meshopt_compression": {"bufferView": 9}}}],
+        "extensions": {"some": {"bufferView": 11}},
+        "extras": {"bufferView": 13},
     }
-    assert sorted(glb_data.mentions(doc)) == [1, 3, 5, 7]
+    assert sorted(glb_data.mentions(doc)) == [1, 3, 5, 7, 9, 11, 13]
 
 
 def ply_bytes(text, body=b""):

@@ -127,3 +127,22 @@ def test_polygons_that_lie_on_one_another_are_twins_and_all_others_have_none(dou
     expected = np.full(len(both), -1)
     expected[:doubled], expected[len(F) :] = len(F) + np.arange(doubled), np.arange(doubled)
     np.testing.assert_array_equal(mirror._Polygons(V, both, None).twins, expected)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_two_layers_that_touch_in_some_faces_each_is_its_own_image(seed):
+    """Faces in one place are told apart by what is around them."""
+    V, Q = bump()
+    V = V - [V[:, 0].mean(), 0, 0]
+    V[:, 2] = np.cos(V[:, 0]) + 0.3 * V[:, 1]
+    x = np.abs(V[:, 0]) / np.abs(V[:, 0]).max()
+    lifted = V + np.outer(x > 0.3, [0, 0, 0.5])
+    T = cut(Q, np.zeros(len(Q), bool))[0]
+    name = np.random.default_rng(seed).permutation(2 * len(V))
+    points, triangles = np.concatenate([V, lifted])[np.argsort(name)], name[np.concatenate([T, T + len(V)])]
+    # Numbered by polygons of two triangles each.
+    polygons = mirror._Polygons(points, triangles, np.arange(len(triangles)) // 2)
+    assert 0 < (polygons.twins >= 0).sum() < len(polygons.twins)
+    other = polygons.images_of_polygons(np.array([1.0, 0, 0]))
+    layer = np.arange(len(other)) >= len(other) // 2
+    np.testing.assert_array_equal(layer[other], layer)

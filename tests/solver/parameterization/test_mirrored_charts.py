@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -19,6 +20,7 @@ from omt_uv.solver.mesh.mirror import find_mirror, partial_mirror
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import (
+    _mirror_of_all,
     images_of_cuts,
     motion_between,
     remembered,
@@ -252,3 +254,31 @@ def test_what_was_refined_is_told_again_for_the_same_map():
     for chart_map in (first, SimpleNamespace(uv=first.uv.copy()), SimpleNamespace(uv=2 * first.uv)):
         np.testing.assert_array_equal(drain(again(chart, chart_map)), chart_map.uv + 1)
     assert len(made) == 2
+
+
+@pytest.mark.parametrize("filled", [1, 3, 12])
+def test_triangles_that_fill_holes_are_polygons_of_their_own_where_a_mirror_is_looked_for(filled):
+    """Of two charts that are each other's image, in whatever order their faces are."""
+    V, F = meshes.bumpy(5, 4, height=0.3)
+    V, rng = V + 0.1 * V[:, ::-1] ** 2, np.random.default_rng(0)
+    name = rng.permutation(len(V))
+    image = (V * [-1, 1, 1] - [1, 0, 0])[np.argsort(name)], name[F[rng.permutation(len(F)), ::-1]].tolist()
+    _, charts = charts_of((V, F.tolist()), image)
+    # The same places on both: the middles of faces from the least distance to the mean of a chart on.
+    found = []
+    for chart in charts:
+        middle = chart.vertices[chart.triangles].mean(axis=1)
+        order = np.argsort(np.linalg.norm(middle - chart.vertices.mean(axis=0), axis=1))
+        hole, rest = order[:filled], np.sort(order[filled:])
+        found.append(
+            replace(
+                chart,
+                triangles=chart.triangles[rest],
+                faces=chart.faces[rest],
+                corners=chart.corners[rest],
+                patches=chart.triangles[hole],
+            )
+        )
+    assert _mirror_of_all(charts) is not None
+    points = np.concatenate([chart.vertices for chart in found])
+    np.testing.assert_allclose(points[_mirror_of_all(found).image], points * [-1, 1, 1] - [1, 0, 0], atol=1e-9)

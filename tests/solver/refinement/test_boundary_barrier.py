@@ -24,6 +24,20 @@ def test_box_pairs_are_those_of_brute_force():
     assert np.array_equal(np.column_stack([i, j]), np.argwhere(meet))
 
 
+@pytest.mark.parametrize("corner", [(0, 0), (-3, 0), (0, -3), (-0.5, 0.5), (2, 2)], ids=str)
+@pytest.mark.parametrize("sizes", [0.05, 2.0])
+def test_a_grid_finds_them_wherever_the_others_lie(corner, sizes, monkeypatch):
+    """Also where others begin below all of the first ones; and both ways round."""
+    monkeypatch.setattr(boxes, "_swept", lambda *_: None)
+    rng = np.random.default_rng(1)
+    low1, low2 = 3 * rng.random((70, 2)), 3 * rng.random((50, 2)) + corner
+    high1, high2 = low1 + sizes * rng.random((70, 2)), low2 + 0.3 * rng.random((50, 2))
+    meet = (low1[:, None] <= high2).all(2) & (low2 <= high1[:, None]).all(2)
+    assert meet.any() or sizes < 1
+    assert np.array_equal(np.column_stack(box_pairs(low1, high1, low2, high2)), np.argwhere(meet))
+    assert np.array_equal(np.column_stack(box_pairs(low2, high2, low1, high1)), np.argwhere(meet.T))
+
+
 @pytest.mark.parametrize("turn", [1, np.exp(0.5j)], ids=["along", "askew"])
 def test_boxes_of_a_long_strip_are_compared_with_their_neighbours_alone(turn, monkeypatch):
     rows = []

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 from sphere_shapes import SHAPES, blob
 
 from omt_uv.solver import errors
+from omt_uv.solver.errors import PrecisionError
 from omt_uv.solver.mesh.geometry import angles_from_lengths, halfedge_lengths, vertex_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
@@ -125,3 +128,32 @@ def test_half_of_a_surface_in_a_point_is_refused_and_less_is_not(share, gathered
             conformal._halved_by_equator(z, 20, mass)
     else:
         assert np.isfinite(conformal._halved_by_equator(z, 20, mass)).all()
+
+
+@pytest.mark.parametrize("failing", range(7))
+def test_the_first_candidate_that_can_be_goes_to_infinity(failing, monkeypatch):
+    """All of them as it is, and then all where the curvature is even."""
+    as_it_is, even = (SimpleNamespace(triangles=np.array([[0, 1, 4]])) for _ in range(2))
+    asked = []
+
+    def flattened(tri, vertex):
+        asked.append((tri is even, vertex))
+        if len(asked) <= failing:
+            raise PrecisionError(f"the {len(asked)}th")
+        yield from ()
+        return "flat"
+
+    def evened(tri, n):
+        assert tri is as_it_is and n == 5
+        yield from ()
+        return even
+
+    monkeypatch.setattr(conformal, "flatten_punctured_sphere", flattened)
+    monkeypatch.setattr(conformal, "with_even_curvature", evened)
+    order = [(late, vertex) for late in (False, True) for vertex in (4, 0, 1)]
+    if failing == len(order):
+        with pytest.raises(PrecisionError, match="the 6th"):
+            drain(conformal._flatten(as_it_is, np.array([4, 0, 1])))
+    else:
+        assert drain(conformal._flatten(as_it_is, np.array([4, 0, 1]))) == (order[failing][1], "flat")
+        assert asked == order[: failing + 1]
