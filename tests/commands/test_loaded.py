@@ -169,6 +169,28 @@ def two_scenes():
     other.collection.objects.link(obj)
 
 
+@pytest.mark.parametrize("active", ["First", "Middle", "Now"])
+def test_objects_of_the_active_scene_come_first_and_then_those_of_the_others_by_name(package, tmp_path, active):
+    """What is in several scenes comes once, where it is first."""
+    first = bpy.context.scene
+    first.name = "First"
+    made = {"First": first} | {name: bpy.data.scenes.new(name) for name in ("Now", "Middle")}
+    for name, scene in made.items():
+        obj = scenes.bump(3, 2, name=f"In {name}")
+        for collection in obj.users_collection:
+            collection.objects.unlink(obj)
+        scene.collection.objects.link(obj)
+    shared = scenes.bump(3, 2, name="Shared")
+    made["Middle"].collection.objects.link(shared)
+    bpy.context.window.scene = made[active]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    found = [obj.name for obj in package("files.meshes").load(tmp_path / "in.blend")]
+    order = [active, *(name for name in ("First", "Middle", "Now") if name != active)]
+    own = {"First": ["In First", "Shared"], "Middle": ["In Middle", "Shared"], "Now": ["In Now"]}
+    expected = list(dict.fromkeys(name for scene in order for name in own[scene]))
+    assert found == expected
+
+
 @pytest.mark.parametrize("words, done", [
     ((), "AB"), (("--scene", "Other"), "B"), (("--object", "A"), "A"), (("--object", "B", "--object", "A"), "AB"),
 ])  # fmt: skip
