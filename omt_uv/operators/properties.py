@@ -74,7 +74,7 @@ class MarginSettings:
     )
     texture_size: IntProperty(
         name="Texture Size",
-        description="Width of the texture that the margin is measured in",
+        description="Width of the texture that the margin and the texel density are measured in",
         default=DEFAULT_TEXTURE_SIZE,
         min=16,
         max=65536,
@@ -90,8 +90,11 @@ def draw_balance(layout: bpy.types.UILayout, properties) -> None:
     row.prop(properties, "balance", text="Area - Angle", slider=True)
 
 
-def draw_margin(layout: bpy.types.UILayout, properties) -> None:
-    layout.prop(properties, "margin", text="Margin", text_ctxt=CONTEXT)
+def draw_margin(layout: bpy.types.UILayout, properties, packed: bool = True) -> None:
+    """The margin, which counts where islands are packed, and the texture, which always does."""
+    column = layout.column()
+    column.active = packed
+    column.prop(properties, "margin", text="Margin", text_ctxt=CONTEXT)
     layout.prop(properties, "texture_size")
 
 

@@ -69,7 +69,8 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column = layout.column()
     column.active = not properties.keep_boundary
     column.prop(properties, "pack")
+    packed = properties.pack and not properties.keep_boundary
+    draw_margin(layout, properties, packed)
     column = layout.column()
-    column.active = properties.pack and not properties.keep_boundary
-    draw_margin(column, properties)
+    column.active = packed
     column.prop(properties, "tile")

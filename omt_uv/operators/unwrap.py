@@ -230,7 +230,7 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     column.active = properties.pack
     column.prop(properties, "pack_around")
     column.prop(properties, "turn_to_fit")
-    draw_margin(column, properties)
+    draw_margin(layout, properties, properties.pack)
     # What is not packed lies in it, too.
     layout.prop(properties, "tile")
     choose_layer(layout, properties, "uv_layer")

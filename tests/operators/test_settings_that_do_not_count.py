@@ -36,8 +36,6 @@ RUNS: list[tuple[str, str, dict]] = [
 # Settings that are names of vertex groups, and a group of some objects, of a single vertex where they have such.
 GROUPS = {"keep_free", "centre_group", "corner_group", "weight_group", "pole_group", "meridian_group", "east_group"}
 OF = {"Band": "centre", "Closed": "pole"}
-# Texel densities are told for a texture of this size.
-TOLD = {"texture_size"}
 
 
 class Layout:
@@ -68,7 +66,7 @@ def drawn(name: str, arguments: dict) -> set[str]:
 def idle(name: str, objects: str, arguments: dict) -> dict:
     """Other values of the settings that do not count with these arguments; names are those of what there is."""
     found = {}
-    count = {"rna_type", *TOLD, *arguments, *drawn(name, arguments)}
+    count = {"rna_type", *arguments, *drawn(name, arguments)}
     for prop in scenes.stand_in(name).rna_type.properties:
         if prop.identifier in count or prop.is_readonly or prop.is_hidden:
             continue
