@@ -10,7 +10,8 @@ import bmesh
 import numpy as np
 
 from ..pipelines.globe import Markers
-from ..solver.analysis.density import from_polygons, means_of_corners, painted_density
+from ..solver.analysis.density import check_region, from_polygons, means_of_corners, painted_density
+from ..solver.errors import WeightError
 from ..solver.globe.rotation import MarkerError
 from .vertex_groups import GroupError, group_weights
 from .weights import region_weights
@@ -61,20 +62,25 @@ def picked_markers(obj: bpy.types.Object) -> Markers:
 
 def globe_densities(pairs: Sequence, name: str, factor: float) -> list[np.ndarray | None]:
     """Densities (m,) of the triangles for each pair of object and Reading: `factor` where the weight is 1, 1 where it
-    is 0.
+    is 0; None where it is the same everywhere, as of objects that are not painted beside one that is.
 
     name : a vertex group, "saliency" or "curvature", see `weights.region_weights`; empty for no densities
 
     Raises
     ------
-    GroupError, Refusal : no such group or score; MeshError : a factor that is not positive
+    GroupError, Refusal : no such group or score; MeshError : a factor that is not positive, no object with a region
+    and a rest
     """
     if not name:
         return [None] * len(pairs)
-    weights = region_weights(pairs, name)
-    densities: list[np.ndarray | None] = []
-    for w, (_, reading) in zip(weights, pairs, strict=True):
+    found = []
+    for w, (_, reading) in zip(region_weights(pairs, name), pairs, strict=True):
         surface = reading.surface
         mean = means_of_corners(w, surface.corner_vertex, surface.face_start)
-        densities.append(painted_density(from_polygons(mean, surface.triangle_face), factor))
-    return densities
+        found.append(from_polygons(mean, surface.triangle_face))
+    # Every part has the whole texture to itself: what one has is of no matter to another.
+    varies = [bool((region != region[:1]).any()) for region in found]
+    if not any(varies):
+        check_region(np.concatenate(found))
+        raise WeightError("No object has both a part of the region and a rest", "Paint a part of an object")
+    return [painted_density(r, factor) if varied else None for r, varied in zip(found, varies, strict=True)]

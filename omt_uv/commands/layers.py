@@ -23,10 +23,15 @@ class Written:
     gate: Gate
 
 
-def read_layers(options: argparse.Namespace, plain: bool = False) -> tuple[list, list]:
+def read_layers(options: argparse.Namespace, plain: bool = False, existing: bool = False) -> tuple[list, list]:
     """Objects and their Readings; refuses an output or a layer that cannot be written before the long work.
 
-    plain : the object may be a `PlainObj`, of which nothing but UVs is asked
+    plain : the object may be a `PlainObj`, of which nothing but UVs is asked; existing : a layer that is named has to
+        be there, or the UVs of another one would be taken for it
+
+    Raises
+    ------
+    CommandError : an object has no such layer
     """
     with without_collections("numpy"):
         check_paths(options)
@@ -38,6 +43,8 @@ def read_layers(options: argparse.Namespace, plain: bool = False) -> tuple[list,
 
     pairs = read_file(options, options.uv_layer)
     for obj, _ in pairs:
+        if existing and options.uv_layer and options.uv_layer not in obj.data.uv_layers:
+            raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
         check_target(obj, options.uv_layer)
     return [obj for obj, _ in pairs], [reading for _, reading in pairs]
 

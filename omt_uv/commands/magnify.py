@@ -134,7 +134,7 @@ def run(options: argparse.Namespace) -> None:
         cascade=options.cascade,
         max_shear=options.max_shear,
     )
-    objects, readings = read_layers(options)
+    objects, readings = read_layers(options, existing=options.source == "uv")
     with refusals(objects):
         readings = chosen_subdivision(options, readings)
         several, told = _regions(named, list(zip(objects, readings, strict=True)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..settings import RefineSettings
-from .common import CommandError, drain_shown, refusals, write_report
+from .common import drain_shown, refusals, write_report
 from .layers import read_layers, write_layers
 from .options import FORMATS, add_area_options, add_files, add_report, add_subdivision, chosen_subdivision
 
@@ -22,12 +22,9 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    objects, readings = read_layers(options)
+    objects, readings = read_layers(options, existing=True)
     from ..pipelines.refine import refine_islands
 
-    for obj in objects:
-        if options.uv_layer and options.uv_layer not in obj.data.uv_layers:
-            raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
     settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
     with refusals(objects):
         readings = chosen_subdivision(options, readings)

@@ -50,3 +50,26 @@ def test_densities_go_from_one_to_the_factor(package):
     (density,) = package("blender.markers").globe_densities(pairs, "face", 4.0)
     assert density.min() == 1 and density.max() == pytest.approx(4)
     assert package("blender.markers").globe_densities(pairs, "", 4.0) == [None]
+
+
+@pytest.mark.parametrize("painted", [(), (0,), (1,), (0, 1)], ids=str)
+@pytest.mark.parametrize("all_over", [None, 0, 1])
+def test_what_is_not_painted_or_all_over_has_no_density_where_another_has(package, painted, all_over):
+    pairs = []
+    for k in range(2):
+        obj = ball()
+        group = obj.vertex_groups.new(name="face")
+        chosen = [v.index for v in obj.data.vertices if k == all_over or (v.co.z > 0 and k in painted)]
+        group.add(chosen, 1.0, "REPLACE")
+        pairs.append((obj, package("blender.mesh").read(obj)))
+    has_both = [k in painted and k != all_over for k in range(2)]
+    densities = package("blender.markers").globe_densities
+    if any(has_both):
+        assert [density is not None for density in densities(pairs, "face", 4.0)] == has_both
+        return
+    words = "No object has both" if all_over is not None else "All weights are zero"
+    with pytest.raises(package("solver.errors").WeightError, match=words):
+        densities(pairs, "face", 4.0)
+    if all_over is not None:
+        with pytest.raises(package("solver.errors").UniformWeightsError):
+            densities([pairs[all_over]], "face", 4.0)

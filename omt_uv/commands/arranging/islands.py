@@ -53,7 +53,7 @@ def _rectified(_options: argparse.Namespace, readings: list):
 
 def arrange(options: argparse.Namespace) -> None:
     """Run one of the three; islands may lie on one another, which two of them are for."""
-    objects, readings = read_layers(options)
+    objects, readings = read_layers(options, existing=True)
     with refusals(objects):
         done = options.arranged(options, readings)
         write_layers(options, zip(objects, readings, strict=True), done, apart=True, existed=True)
