@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import threading
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -207,6 +209,28 @@ def test_a_servant_prints_to_the_files_of_a_task_and_then_where_it_did_before(pa
     assert answer["status"] == 4 and seen == [["a"]] and answer["processor"] >= 0
     if serve.STATUS.is_file():
         assert answer["memory"] >= answer["at_rest"] > 10**6
+
+
+@pytest.mark.parametrize("cuts", [(), (7,), (3, 4, 40), tuple(range(1, 90, 5))], ids=str)
+def test_a_servant_answers_every_line_however_they_come(package, tmp_path, monkeypatch, cuts):
+    """Several at once, and one in parts."""
+    serve = package("commands.batches.serve")
+    lines = b"".join(json.dumps({"words": [str(k)]}).encode() + b"\n" for k in range(6))
+    done, answers, ends = [], [], (0, *cuts, len(lines))
+
+    def begin(gigabytes, hear):
+        assert gigabytes == 1.5
+        for a, b in pairwise(ends):
+            hear(lines[a:b])
+        # What ends the process in truth.
+        hear(None)
+
+    monkeypatch.setattr(serve, "begin_child", begin)
+    monkeypatch.setattr(serve, "_answered", lambda task, carry: done.append(carry(task["words"])) or {"status": 0})
+    monkeypatch.setattr(serve.os, "write", lambda number, text: answers.append(json.loads(text)))
+    with pytest.raises(TypeError):
+        serve.serve(1.5, lambda words: int(words[0]))
+    assert done == list(range(6)) and answers == [{"status": 0}] * 6
 
 
 @pytest.mark.parametrize("text, expected", [

@@ -151,6 +151,25 @@ def test_blocks_are_asked_for_by_what_they_hold(distances, package, tmp_path, mo
     assert Path(asked_for["index"]).read_bytes() == b"index"
 
 
+def test_blocks_of_another_index_are_other_blocks(distances, package, tmp_path, monkeypatch):
+    """A batch goes on with what it has of the same words: these name what the index holds."""
+    words, other = [], type("Other", (), {"bytes": lambda self: b"another index"})()
+
+    def carried_out(options, plan, tasks):
+        (plan.output).mkdir(parents=True, exist_ok=True)
+        np.save(plan.output / "0_1_0_1.npy", np.zeros(1))
+        words.append((tmp_path / f"out{distances.BLOCKS}" / "asked" / "0_1_0_1.json").read_text())
+        return {"a": {"state": "done", "message": "fine"}}
+
+    monkeypatch.setattr(distances, "carried_out", carried_out)
+    monkeypatch.setattr(package("batch.plan"), "tasks_of", lambda plan, path: path.read_text())
+    for index in (Index(), other, Index()):
+        distances._by_batch(asked(tmp_path), index, [(0, 1, 0, 1)], 0.25)
+    assert words[0] == words[2] != words[1]
+    held = [Path(json.loads(text)["index"]).read_bytes() for text in words]
+    assert held == [b"index", b"another index", b"index"]
+
+
 @pytest.mark.parametrize(
     "text", ["{", "[]", '{"index": "a", "block": 1}', '{"index": 3, "block": [], "curvature": "x"}']
 )

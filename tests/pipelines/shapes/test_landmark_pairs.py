@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import meshes
 import numpy as np
 import pytest
 
@@ -63,6 +64,21 @@ def test_a_file_of_pairs_that_cannot_be_read_is_named(tmp_path, text):
         path.write_bytes(text.encode("latin-1"))
     with pytest.raises(landmark_pairs.PairsError, match="pairs"):
         landmark_pairs.read_pairs(path)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_vertices_of_no_face_attract_no_landmarks(seed):
+    """Wherever they are: landmarks float about a thin wall, each nearest to the side that it is on."""
+    rng = np.random.default_rng(seed)
+    V, F = meshes.bumpy(6, 6, height=0.1)
+    wall = np.concatenate([V, V - [0, 0, 0.02]]), np.concatenate([F, F[:, ::-1] + len(V)])
+    place = wall[0][rng.integers(len(wall[0]), size=12)] + 0.03 * rng.normal(size=(12, 3))
+    points = tuple(LandmarkPoint(str(k), position=tuple(p)) for k, p in enumerate(place.tolist()))
+    faces, weights = landmark_pairs._located(points, *wall)
+    # Loose vertices where the landmarks are, before all others.
+    loose = np.concatenate([place, wall[0]]), wall[1] + len(place)
+    np.testing.assert_array_equal(landmark_pairs._located(points, *loose)[0], faces)
+    np.testing.assert_allclose(landmark_pairs._located(points, *loose)[1], weights, atol=1e-12)
 
 
 @pytest.mark.parametrize(("vertex", "there"), [(0, True), (2, True), (3, False), (4, False)])
