@@ -74,6 +74,19 @@ def test_where_the_file_of_a_buffer_is_not_its_bytes_are(tmp_path):
     assert json.loads(new)["buffers"][0]["uri"].startswith("data:")
 
 
+def test_a_file_whose_uvs_stay_goes_elsewhere_with_its_buffers(tmp_path):
+    """The text is not the same there: it names files that are not beside it."""
+    data, raw = gltf_parts()
+    (tmp_path / "cu be.bin").write_bytes(raw)
+    (tmp_path / "there").mkdir()
+    here, _ = gltf.put(data, [imported_triangles(spread(36))], tmp_path, tmp_path)
+    same = as_imported(gltf.read(here, tmp_path), spread(36))
+    assert gltf.put(here, [same], tmp_path, tmp_path)[0] == here
+    there, _ = gltf.put(here, [same], tmp_path, tmp_path / "there")
+    (tmp_path / "cu be.bin").unlink()
+    assert np.allclose(uvs(gltf.read(there, tmp_path / "there")), spread(36), atol=2e-7)
+
+
 def test_what_is_no_gltf_or_lies_elsewhere_is_named(tmp_path):
     data, raw = gltf_parts()
     meshes = [imported_triangles(spread(36))]

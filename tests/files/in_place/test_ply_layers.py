@@ -7,6 +7,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from mesh_bytes import imported
 
 from omt_uv.files.in_place import ply
 
@@ -55,3 +56,21 @@ def test_faces_whose_corners_all_have_uvs_keep_them_and_others_have_none(lengths
 
 def test_a_file_without_uvs_has_none():
     assert ply.read_uv(file_of([]))[1] is None
+
+
+@pytest.mark.parametrize("moved", [[], [0], [1], [0, 1]], ids=str)
+def test_faces_whose_uvs_stay_keep_how_they_were_written(moved):
+    """Numbers may be written in many ways."""
+    data = file_of([], corners=True)
+    for word in range(100, 116):
+        data = data.replace(b" %d" % word, b" %d.50e0" % word)
+    wished = ply.read_uv(data)[1].astype(np.float32)
+    for face in moved:
+        wished[3 * face + 1] += np.float32(0.25)
+    new, told = ply.put(data, [imported(FACES, wished, np.array(POINTS, float))])
+    assert told == [] and (ply.read_uv(new)[1].astype(np.float32) == wished).all()
+    before, after = data.splitlines(), new.splitlines()
+    assert len(before) == len(after) and [a != b for a, b in zip(before[-2:], after[-2:], strict=True)] == [
+        face in moved for face in range(2)
+    ]
+    assert before[:-2] == after[:-2]

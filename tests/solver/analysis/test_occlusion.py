@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.occlusion import face_occlusion, vertex_occlusion
+from omt_uv.solver.analysis.occlusion import face_occlusion, in_view, vertex_occlusion
 
 
 def bowl():
@@ -69,3 +69,20 @@ def test_what_is_the_same_on_all_faces_is_the_same_at_all_vertices(value):
     for k in range(len(V)):
         around = sides[0, (k == F).any(axis=1)]
         assert around.min() - 1e-12 <= found[k] <= around.max() + 1e-12
+
+
+def test_a_patch_shows_the_cosine_of_its_slant_and_its_back_shows_nothing():
+    """From all around, whatever of it is whose; and what lies below another one is not seen from above."""
+    V, F = meshes.grid(6, 6)
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(30, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    normal = np.cross(V[F[0, 1]] - V[F[0, 0]], V[F[0, 2]] - V[F[0, 0]])
+    cosine = directions @ (normal / np.linalg.norm(normal))
+    shown = in_view(V, F, directions)
+    assert (cosine < 0).any() and (shown[cosine < 0] == 0).all()
+    front = cosine > 0.2
+    np.testing.assert_allclose(shown[front], np.broadcast_to(cosine[front, None], shown[front].shape), atol=0.02)
+    both = np.concatenate([V, V + normal / np.linalg.norm(normal)]), np.concatenate([F, F + len(V)])
+    above = in_view(*both, normal[None] / np.linalg.norm(normal))[0]
+    assert above[: len(F)].max() == 0 and above[len(F) :].min() > 0.98

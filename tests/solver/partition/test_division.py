@@ -154,6 +154,20 @@ def test_ring_by_ring_every_face_gets_the_label_beside_it():
         assert np.array_equal(turned[one], _joined(turned[label], mass, corner_vertex, start))
 
 
+@pytest.mark.parametrize("height", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("count", [3, 12])
+def test_pieces_of_slivers_have_no_vertex_twice(height, count):
+    """Rows of triangles, every second of them as good as flat: points of their cells are one."""
+    V, F = meshes.grid(12, 6)
+    row = np.round(V[:, 1] / np.ptp(V[:, 1]) * 6).astype(int)
+    V[:, 1] = (row + 1) // 2 + height * (row // 2)
+    division = drain(divide(V, F, count, options=DivisionOptions(relax=1)))
+    mesh = cut_along_cells(V, F, division)
+    size = np.diff(mesh.face_start)
+    owner = np.repeat(np.arange(len(size)), size)
+    assert size.min() >= 3 and len(np.unique(np.stack([owner, mesh.corner_vertex], axis=1), axis=0)) == size.sum()
+
+
 def test_no_cell_passes_through_a_single_vertex():
     V, F = meshes.grid(8, 8)
     V = np.concatenate([V, V + [1, 1, 0]])
