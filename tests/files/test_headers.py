@@ -68,7 +68,8 @@ def test_a_binary_stl_has_fifty_bytes_for_every_face(tmp_path):
 
 def test_a_text_of_stl_tells_its_faces_itself(tmp_path):
     facet = b"facet normal 0 0 1\nouter loop\nendloop\nendfacet\n"
-    assert holds(tmp_path / "a.stl", b"solid a\n" + 2 * facet + b"endsolid") == 2
+    for before in (b"", b" ", b"\n\t"):
+        assert holds(tmp_path / "a.stl", before + b"solid a\n" + 2 * facet + b"endsolid") == 2
 
 
 def test_a_glb_is_as_long_as_it_says(tmp_path):

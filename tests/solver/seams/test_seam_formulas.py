@@ -218,6 +218,23 @@ def test_boxes_of_pieces_are_measured():
     np.testing.assert_allclose(body.steps, middle)
 
 
+@pytest.mark.parametrize("crumb", [False, True])
+def test_necks_that_leave_a_crumb_beside_the_limb_are_none(crumb, monkeypatch):
+    """As a cut may that goes round a polygon, or the image of one that comes too near to it."""
+    V, F = meshes.grid(24, 4, width=24.0, height=4.0)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    body = body_of(chart, chart.vertices[:, :2])
+    side = body.places[:, 0] < 9
+    if crumb:
+        side[np.argmin(np.linalg.norm(body.places - [18, 2], axis=1))] = True
+    monkeypatch.setattr(limbs._Body, "_narrowest", lambda self, *_: side)
+    monkeypatch.setattr(limbs, "NECK", 10.0)
+    found = list(body.necks(np.zeros(len(body.graph.joined), bool), None))
+    assert len(found) == (0 if crumb else limbs.TIPS)
+    for neck in found:
+        np.testing.assert_array_equal(neck, side[body.graph.joined[:, 0]] != side[body.graph.joined[:, 1]])
+
+
 def test_the_narrowest_level_is_the_shortest_for_what_it_takes_off():
     """Of a bar with a neck: the cut is there, and the side it gives is that of the tip."""
     V, F = meshes.grid(20, 6, width=20.0, height=6.0)
