@@ -211,6 +211,25 @@ def test_a_servant_prints_to_the_files_of_a_task_and_then_where_it_did_before(pa
         assert answer["memory"] >= answer["at_rest"] > 10**6
 
 
+def test_what_python_still_holds_goes_where_it_was_printed_to(tmp_path):
+    """Streams that are no terminals keep what is printed for a while."""
+    lines = [
+        "import sys",
+        "from omt_uv.commands.batches.serve import _printing_to",
+        "print('before', end=' ')",
+        "with _printing_to(*sys.argv[1:]):",
+        "    print('out of the task')",
+        "    print('error of the task', file=sys.stderr)",
+        "print('after')",
+    ]
+    files = tmp_path / "out", tmp_path / "err"
+    words = [sys.executable, "-c", "\n".join(lines), *map(str, files)]
+    held = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    done = subprocess.run(words, env=held, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("before after\n", "")
+    assert [path.read_text() for path in files] == ["out of the task\n", "error of the task\n"]
+
+
 @pytest.mark.parametrize("cuts", [(), (7,), (3, 4, 40), tuple(range(1, 90, 5))], ids=str)
 def test_a_servant_answers_every_line_however_they_come(package, tmp_path, monkeypatch, cuts):
     """Several at once, and one in parts."""
