@@ -86,7 +86,7 @@ def test_the_mean_of_a_folder(run, tmp_path):
         bpy.ops.wm.obj_export(filepath=str(tmp_path / f"scan{k}.obj"), forward_axis="Y", up_axis="Z",
                               export_materials=False)  # fmt: skip
     out, report = tmp_path / "mean.blend", tmp_path / "r.json"
-    status, text, err = run("average", tmp_path, "-o", out, "--report", report)
+    status, text, err = run("average", tmp_path, "-o", out, "--report", report, "--score", 1.2)
     assert status == 0, err
     rows = json.loads(report.read_text())["shapes"]
     assert [row["matched"] for row in rows] == [False] * 4
@@ -95,6 +95,17 @@ def test_the_mean_of_a_folder(run, tmp_path):
     score = np.zeros(len(V), np.float32)
     bpy.data.objects["scan2"].data.attributes["OMT Z-Score"].data.foreach_get("value", score)
     assert score.argmax() == 5 and "OMT Deviation" in bpy.data.objects["Mean"].data.attributes
+    # What is told of a file is what is written of it, and all stand side by side.
+    for k, row in enumerate(rows):
+        obj = bpy.data.objects[f"scan{k}"]
+        score, far = (
+            np.array([d.value for d in obj.data.attributes[name].data]) for name in ("OMT Z-Score", "OMT Deviation")
+        )
+        told = [row[name] for name in ("greatest_score", "vertices_beyond", "greatest", "rms")]
+        assert told == pytest.approx([score.max(), (score > 1.2).sum(), far.max(), np.sqrt((far**2).mean())], rel=1e-5)
+        assert 0 < row["vertices_beyond"] < len(V) and f"{row['vertices_beyond']} vertices beyond 1.2" in text
+        assert obj.location.x == pytest.approx((k + 1) * bpy.data.objects["scan0"].location.x)
+    assert bpy.data.objects["scan0"].location.x >= np.ptp([v.co.x for v in bpy.data.objects["Mean"].data.vertices])
     status, _, err = run("average", tmp_path / "none", "-o", out)
     assert status == 1 and "no such folder" in err
 
