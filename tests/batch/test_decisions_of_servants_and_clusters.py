@@ -267,7 +267,7 @@ def test_a_cluster_of_this_machine_has_so_many_workers(address, count, monkeypat
                       "dashboard_address": "127.0.0.1:0"}]  # fmt: skip
 
 
-@pytest.mark.parametrize("address", ["local", "local:2", "tcp://10.0.0.1:8786"])
+@pytest.mark.parametrize("address", ["local", "local:2", "tcp://10.0.0.1:8786", "localhost:8786", "locals"])
 @pytest.mark.parametrize("fails", [None, OSError("refused"), ValueError("no address")])
 def test_who_is_asked_for_workers_and_what_is_told_if_nobody_answers(address, fails, monkeypatch):
     distributed = pytest.importorskip("distributed")
@@ -282,7 +282,8 @@ def test_who_is_asked_for_workers_and_what_is_told_if_nobody_answers(address, fa
     own = SimpleNamespace(scheduler_address="tcp://127.0.0.1:1", close=lambda timeout: closed.append(f"own {timeout}"))
     monkeypatch.setattr(distributed, "Client", client)
     monkeypatch.setattr(cluster, "_local_cluster", lambda address: own)
-    at = "tcp://127.0.0.1:1" if address.startswith("local") else address
+    is_own = address in ("local", "local:2")
+    at = "tcp://127.0.0.1:1" if is_own else address
     if fails is not None:
         with pytest.raises(plan.BatchError, match=rf"{at}: no scheduler answers \({fails}\)"):
             cluster.Cluster(PLAN, ["a", "b"], address, True)
@@ -290,7 +291,7 @@ def test_who_is_asked_for_workers_and_what_is_told_if_nobody_answers(address, fa
     mine = cluster.Cluster(PLAN, ["a", "b"], address, True)
     assert asked == [(at, {"timeout": 20, "set_as_default": False})] and mine.start == ("a", "b") and mine.send
     mine.close()
-    assert closed == ["client 5", *(["own 10"] if address.startswith("local") else [])]
+    assert closed == ["client 5", *(["own 10"] if is_own else [])]
 
 
 @pytest.mark.parametrize("sent", [False, True])

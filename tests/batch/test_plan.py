@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -104,6 +106,18 @@ def test_a_name_is_one_word_and_no_option(package, folder, tmp_path):
             *plan.options,
         ]
         assert shlex.split(module.shell_text(words)) == words
+
+
+def test_paths_are_whole_wherever_the_program_was_begun(package, tmp_path, monkeypatch):
+    """A worker begins elsewhere, and a name that begins with a dash would be an option."""
+    module = package("batch.plan")
+    monkeypatch.chdir(tmp_path)
+    places = {name: Path(f"-{name}") for name in ("input", "output", "report", "preview")}
+    task = SimpleNamespace(path=Path("-a.obj"), output=Path("-b.obj"))
+    here = tmp_path.resolve()
+    for given, words in (({}, ["-a.obj", "-b.obj"]), (places, [f"-{name}" for name in places])):
+        found = [w for w in module.words_of(plan_of(package, tmp_path / "out"), task, given)[1:] if "/" in w]
+        assert [Path(word) for word in found] == [here / word for word in words]
 
 
 def test_the_key_changes_with_whatever_changes_results(package, tmp_path):

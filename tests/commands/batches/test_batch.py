@@ -7,11 +7,13 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from urllib.parse import unquote
 
 import pytest
 
@@ -62,6 +64,12 @@ def test_a_folder_is_unwrapped_with_table_summary_and_page(run, folder):
     assert json.loads(out)["counts"] == {"done": 2, "failed": 1}
     assert run("page", target)[0] == 0
     assert "out.previews/sub/-b%20%24%28touch%20x%29%3B%20.obj.png" in (target.with_name("out.html")).read_text()
+    # Wherever a page is, it finds its pictures from there.
+    (folder / "pages").mkdir()
+    assert run("page", target, "-o", folder / "pages" / "one.html")[0] == 0
+    for page in (target.with_name("out.html"), folder / "pages" / "one.html"):
+        links = re.findall(r'"([^"]*out\.previews[^"]*)"', page.read_text())
+        assert len(set(links)) == 2 and all((page.parent / unquote(link)).is_file() for link in links)
     assert run(*words[:5], "--allow-failures", *words[5:])[0] == 0
     assert run("table", target, "-o", folder / "t.txt")[0] == 1
 
