@@ -298,3 +298,25 @@ def test_preferences_are_those_of_the_add_on_that_blender_knows(package):
     root = package("registration").__name__.rpartition(".")[0]
     assert module.OMTUVPreferences.bl_idname == module.ADDON == (root.rpartition(".")[0] or root)
     assert module.ADDON and root == module.PACKAGE
+
+
+@pytest.mark.parametrize("kind", ["AREA", "SHEAR", "NONE", ""])
+def test_the_scale_of_colours_is_as_high_with_colours_and_without(package, monkeypatch, kind):
+    """Two lines, so that nothing below moves when colours come or go."""
+    module, lines = package("panels.inspect"), []
+
+    class Line:
+        def __init__(self):
+            self.labels = 0
+            lines.append(self)
+
+        def row(self, **_):
+            return self
+
+        def label(self, **_):
+            self.labels += 1
+
+    column = SimpleNamespace(row=lambda **_: Line(), split=lambda **_: Line())
+    monkeypatch.setattr(module.colour_bar, "icons", lambda _: [1, 2, 3])
+    module.draw_bar(SimpleNamespace(column=lambda **_: column), kind)
+    assert [line.labels for line in lines] == ([3, 3] if kind in ("AREA", "SHEAR") else [1, 1])

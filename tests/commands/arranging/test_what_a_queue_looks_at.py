@@ -37,3 +37,28 @@ def test_uvs_that_stay_are_looked_at_as_they_are(package, monkeypatch, there, ma
     folded = gate.Gate(2, 1, 0.0).warnings()[0]
     assert done.warnings == [(k, text) for k in (0, 1) for text in ("one", "two", folded)]
     assert done.objects == ["A", "B"] and (mesh.uv is None or (mesh.uv == uv).all())
+
+
+@pytest.mark.parametrize("steps", [3, 9, 10, 11, 30])
+def test_all_steps_of_a_mesh_together_have_so_many_seconds(package, monkeypatch, steps):
+    queue, clock = package("commands.arranging.queue"), [100.0]
+    monkeypatch.setattr(queue.time, "monotonic", lambda: clock[0])
+
+    def mapped():
+        for k in range(steps):
+            clock[0] += 0.5
+            yield k
+        return "done"
+
+    seen = []
+
+    def within():
+        found = yield from queue._within(mapped(), SimpleNamespace(limit=5.0))
+        seen.append(found)
+
+    if steps <= 10:
+        assert list(within()) == list(range(steps)) and seen == ["done"]
+    else:
+        with pytest.raises(queue.TooSlowError, match="more than 5 s"):
+            list(within())
+        assert clock[0] == 105.5

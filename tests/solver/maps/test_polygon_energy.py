@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps.energy import area_error, elements, energy, gradient
+from omt_uv.solver.maps.energy import area_error, area_forms_of, elements, energy, gradient
 from omt_uv.solver.maps.polygon_elements import polygon_elements, polygon_mesh, restricted, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.parameterization.polygons.polygon_corners import CONVEX
@@ -124,3 +124,20 @@ def test_the_area_error_vanishes_for_a_map_with_the_areas_asked_for():
     V, Q = quads()
     V[:, 2] = 0
     assert area_error(of(V, Q, np.zeros(len(Q), bool)), V[:, :2] @ [1, 1j]) < 1e-14
+
+
+@pytest.mark.parametrize("lone", [0, 1, 7, 24])
+def test_rows_of_areas_are_those_of_polygons_of_several_triangles_alone(lone):
+    """Others have theirs among the rest of what is theirs, and would have them twice."""
+    V, Q = quads()
+    T, faces = cut(Q, np.zeros(len(Q), bool))
+    # Both halves of the last quads are polygons of their own.
+    own = faces >= len(Q) - lone
+    found = polygon_elements(V, T, face_areas(V, T), np.where(own, len(Q) + np.arange(len(T)), faces))
+    w = flat(V)
+    a, b = found.derivatives(w)
+    rows = area_forms_of(found, a, b, 3.0)
+    alone = np.bincount(found.polygon)[found.polygon] == 1
+    assert alone.sum() == 2 * lone and (rows[alone] == 0).all()
+    has_rows = np.bincount(found.polygon[~alone], np.abs(rows[~alone]).sum(axis=1))
+    assert (has_rows[np.unique(found.polygon[~alone])] > 0).all()
