@@ -23,7 +23,7 @@ from ..solver.mesh.surface import Surface
 from . import mesh as blender_mesh
 from .read_attributes import read_attributes
 from .vertex_groups import group_weights
-from .write_attributes import write_attributes
+from .write_attributes import keep_chosen, write_attributes
 
 # Modifiers that keep data for the very vertices of a mesh and are of no use on another.
 BOUND = {
@@ -167,6 +167,8 @@ def new_objects(
         mesh = _new_mesh(group[0], group[0].name + ending, request, level)
         new = [_new_object(obj, obj.name + ending, mesh, request.evaluated) for obj in group]
         write_attributes(new[0], attributes)
+        for made, obj in zip(new, group, strict=True):
+            keep_chosen(made, obj)
         for face in np.flatnonzero(level.back).tolist():
             mesh.polygons[face].flip()
         names += [obj.name for obj in new]

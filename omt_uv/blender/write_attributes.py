@@ -30,6 +30,18 @@ def write_attributes(obj: bpy.types.Object, attributes: Attributes) -> None:
     mesh.update()
 
 
+def keep_chosen(obj: bpy.types.Object, old: bpy.types.Object) -> None:
+    """Let an object have that vertex group and shape key active which the old one has, and its groups locked."""
+    for group in old.vertex_groups:
+        if group.name in obj.vertex_groups:
+            obj.vertex_groups[group.name].lock_weight = group.lock_weight
+    active, key = old.vertex_groups.active, old.active_shape_key
+    if active is not None and active.name in obj.vertex_groups:
+        obj.vertex_groups.active_index = obj.vertex_groups[active.name].index
+    if key is not None and obj.data.shape_keys is not None:
+        obj.active_shape_key_index = max(0, obj.data.shape_keys.key_blocks.find(key.name))
+
+
 def _write_marks(mesh: bpy.types.Mesh, marks: Marks) -> None:
     if not len(marks.edges):
         return

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..solver.analysis.density import Target
-from ..solver.errors import APPLY_LEVEL, plural
+from ..solver.errors import APPLY_LEVEL, plural, two_digits
 from ..solver.maps.distortion import distortion
 from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.charts import turned_polygons
@@ -47,9 +47,7 @@ CLOSE = 1.3
 NUDGE = 1.5
 MOST_NUDGE = 8.0
 AIM = 0.995
-COARSE = (
-    "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface; {}"
-)
+COARSE = "Areas on the subdivided surface are {} off: the mesh is too coarse for its UVs to follow that surface; {}"
 # How warnings about the areas of a cage begin.
 AREA_WARNING = "Areas are"
 # Corners of one vertex closer than this have one UV, as for Blender.
@@ -174,7 +172,7 @@ def refined_on_subdivision(
         mine, own = part.chart == k, slice(part.first[k], part.first[k + 1])
         maps.append(_with_figures(old, refined[own], part.corners[mine], part.mapping.quads[mine], fine_uv))
     error = part.area_error(refined)
-    more = (COARSE.format(100 * error, APPLY_LEVEL),) if areas_first and error > INEXACT else ()
+    more = (COARSE.format(two_digits(error), APPLY_LEVEL),) if areas_first and error > INEXACT else ()
     return replace(found, maps=maps, warnings=(*found.warnings, *more))
 
 

@@ -64,3 +64,14 @@ def test_a_landmark_is_put_once_and_moved_then(landmarks):
     assert landmarks.free_name([obj], "LM_") == "LM_2"
     assert landmarks.remove_landmarks(obj, "LM_") == 2 and not list(obj.children)
     assert landmarks.free_name([obj], "LM_") == "LM_1"
+
+
+def test_landmarks_of_another_prefix_are_let_be(landmarks):
+    """What picks or suggests them marks them; that one is marked does not say whose it is."""
+    obj = scenes.bump()
+    for name in ("LM_1", "LM_2", "ear 1"):
+        landmarks.put_landmark(obj, name, (0.5, 0.25, 0.0))
+    bpy.context.view_layer.update()
+    assert [point.name for point in landmarks.read_landmarks(obj, "ear ")] == ["ear 1"]
+    assert landmarks.free_name([obj], "ear ") == "ear 2"
+    assert landmarks.remove_landmarks(obj, "LM_") == 2 and [child.name for child in obj.children] == ["ear 1"]

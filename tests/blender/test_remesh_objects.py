@@ -188,3 +188,21 @@ def test_new_objects_and_their_meshes_are_named_after_their_object_and_level(lev
         (ending,) = [e for e in endings if new.name.endswith(e)]
         assert new.data.name in {o.name + ending for o in objects}
     assert len({o.data.name for o in made}) == levels
+
+
+@pytest.mark.parametrize("way", ["remesh", "cells"])
+def test_what_was_active_and_locked_stays_so(way):
+    obj = dressed()
+    obj.vertex_groups.active_index, obj.active_shape_key_index = 0, 1
+    obj.vertex_groups["empty"].lock_weight = True
+    before = set(bpy.data.objects)
+    if way == "remesh":
+        remesh(target_vertices=60)
+    else:
+        assert bpy.ops.mesh.omt_partition(cells=3, relax=0, write="MESH") == {"FINISHED"}
+    (new,) = made(before)
+    assert new.vertex_groups.active.name == "slope" and new.active_shape_key.name == "Up"
+    assert [group.name for group in new.vertex_groups if group.lock_weight] == ["empty"]
+    scenes.select([obj])
+    obj.vertex_groups.active_index = 1
+    assert new.vertex_groups.active.name == "slope"

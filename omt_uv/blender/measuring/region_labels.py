@@ -85,15 +85,26 @@ def _values(pairs: Pairs, name: str) -> Regions:
             labels.append(np.full(len(reading.faces), None, dtype=object))
             continue
         there = True
-        values = np.zeros(len(reading.faces), bool if attribute.data_type == "BOOLEAN" else np.int32)
-        attribute.data.foreach_get("value", values)
-        labels.append(values.astype(object))
+        labels.append(_face_values(obj, name, bool if attribute.data_type == "BOOLEAN" else np.int32).astype(object))
     if not there:
         return []
     found = _by_label(labels, lambda value: f"{name} {int(value)}")
     if len(found) > MOST_VALUES:
         raise RegionError(f"{name}: {len(found)} different values are no regions. Choose an attribute with fewer.")
     return found
+
+
+def _face_values(obj: bpy.types.Object, name: str, kind: type) -> np.ndarray:
+    """Values (f,) of an attribute of the faces of an object that has been read, in any mode."""
+    # In Edit Mode attributes tell no values.
+    mesh = obj.data.copy() if obj.data.is_editmode else obj.data
+    try:
+        values: np.ndarray = np.zeros(len(mesh.polygons), kind)
+        mesh.attributes[name].data.foreach_get("value", values)
+        return values
+    finally:
+        if mesh is not obj.data:
+            bpy.data.meshes.remove(mesh)
 
 
 def _by_label(labels: list[np.ndarray], called) -> Regions:

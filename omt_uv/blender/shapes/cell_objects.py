@@ -13,7 +13,7 @@ from ...settings import CELL_ATTRIBUTE
 from ...solver.mesh.surface import Surface, chosen_triangles
 from .. import mesh as blender_mesh
 from ..read_attributes import read_attributes
-from ..write_attributes import write_attributes
+from ..write_attributes import keep_chosen, write_attributes
 
 CELLS_ENDING = "_cells"
 POINTS_ENDING = "_points"
@@ -49,6 +49,7 @@ def new_cell_mesh(
         mesh.materials.append(material)
     new = _new_object(obj, obj.name + CELLS_ENDING, mesh)
     write_attributes(new, carry_to_cells(carried, surface, corners, cut))
+    keep_chosen(new, obj)
     if CELL_ATTRIBUTE not in mesh.attributes:
         mesh.attributes.new(CELL_ATTRIBUTE, "INT", "FACE")
     mesh.attributes[CELL_ATTRIBUTE].data.foreach_set("value", cut.cell.astype(np.int32))

@@ -26,7 +26,7 @@ def read_landmarks(obj: bpy.types.Object, prefix: str) -> list[LandmarkPoint]:
     for empty in empties(obj, prefix):
         place = inverse @ np.append(np.array(empty.matrix_world.translation), 1)
         x, y, z = (stretch(obj) @ place[:3]).tolist()
-        found.append(LandmarkPoint(_name_of(empty, prefix), position=(x, y, z)))
+        found.append(LandmarkPoint(_name_of(empty), position=(x, y, z)))
     return found
 
 
@@ -59,9 +59,9 @@ def _vertex_of(obj: bpy.types.Object, positions: np.ndarray, name: str) -> list[
 
 
 def empties(obj: bpy.types.Object, prefix: str) -> Iterator[bpy.types.Object]:
-    """The empties that are landmarks of an object: its children."""
+    """The empties that are landmarks of an object, with names that begin so: its children."""
     for child in obj.children:
-        if child.type == "EMPTY" and (NAME in child or child.name.startswith(prefix)):
+        if child.type == "EMPTY" and _name_of(child).startswith(prefix):
             yield child
 
 
@@ -95,7 +95,7 @@ def free_name(objects: list[bpy.types.Object], prefix: str) -> str:
     return next(f"{prefix}{k}" for k in range(1, len(used) + 2) if f"{prefix}{k}" not in used)
 
 
-def _name_of(empty: bpy.types.Object, prefix: str) -> str:
+def _name_of(empty: bpy.types.Object) -> str:
     return empty.get(NAME) or re.sub(r"\.\d{3,}$", "", empty.name)
 
 

@@ -56,3 +56,17 @@ def test_texel_densities_are_those_of_the_texture_that_is_chosen(package, bump, 
         first, second = vars(one), vars(other)
         assert first.pop("texel_density") == pytest.approx(4 * second.pop("texel_density"))
         assert first == second
+
+
+@pytest.mark.parametrize("kind", ["INT", "BOOLEAN"])
+def test_values_of_an_attribute_are_regions_in_edit_mode_too(package, bump, monkeypatch, kind):
+    region_figures = package("pipelines.measuring.region_figures")
+    tables, told = [], region_figures.table_text
+    monkeypatch.setattr(region_figures, "table_text", lambda rows, *more: tables.append(rows) or told(rows, *more))
+    values = np.arange(len(bump.data.polygons)) % 2
+    bump.data.attributes.new("zone", kind, "FACE").data.foreach_set("value", values.tolist())
+    for enter in (lambda: None, lambda: scenes.edit(bump)):
+        enter()
+        assert bpy.ops.uv.omt_regions(kind="ATTRIBUTE", attribute="zone") == {"FINISHED"}
+    assert tables[0] == tables[1] and len(tables[0]) == 3
+    assert len(bpy.data.meshes) == 1
