@@ -259,7 +259,7 @@ def test_landmarks_are_empties_of_the_object_with_the_mark_or_the_prefix(package
     child("mesh", "MESH", "LM_4"), child("LM_5", parent=plane("Else"))
     bpy.context.view_layer.update()
     assert {e.name for e in marks.empties(obj, "LM_")} == {"LM_1", "LM_2.001", "renamed"}
-    assert {marks._name_of(e, "LM_") for e in marks.empties(obj, "LM_")} == {"LM_1", "LM_2", "LM_3"}
+    assert {marks._name_of(e) for e in marks.empties(obj, "LM_")} == {"LM_1", "LM_2", "LM_3"}
     assert marks.free_name([obj], "LM_") == "LM_4"
     assert marks.remove_landmarks(obj, "LM_") == 3 and not list(marks.empties(obj, "LM_"))
     assert "other" in bpy.data.objects and marks.free_name([obj], "LM_") == "LM_1"
