@@ -6,6 +6,8 @@ but the corners it is told to.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import bpy
@@ -47,11 +49,8 @@ def read(obj: bpy.types.Object, layer: str = "") -> Reading:
     if obj.mode != "EDIT":
         return read_mesh(obj.data, obj, layer)
     obj.update_from_editmode()
-    copy = obj.data.copy()
-    try:
+    with readable(obj.data) as copy:
         return read_mesh(copy, obj, layer, edit_mode=True)
-    finally:
-        bpy.data.meshes.remove(copy)
 
 
 def read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str = "", edit_mode: bool = False) -> Reading:
@@ -213,11 +212,19 @@ def check_target(obj: bpy.types.Object, name: str) -> None:
 
 def _attribute_names(mesh: bpy.types.Mesh) -> set[str]:
     """Names of all attributes; Edit Mode hides those that every mesh has, as positions."""
+    with readable(mesh) as whole:
+        return {*mesh.attributes.keys(), *whole.attributes.keys()}
+
+
+@contextmanager
+def readable(mesh: bpy.types.Mesh) -> Iterator[bpy.types.Mesh]:
+    """A mesh whose attributes can be read: itself, or in Edit Mode, where they tell no values, a copy for as long."""
     if not mesh.is_editmode:
-        return set(mesh.attributes.keys())
+        yield mesh
+        return
     copy = mesh.copy()
     try:
-        return {*mesh.attributes.keys(), *copy.attributes.keys()}
+        yield copy
     finally:
         bpy.data.meshes.remove(copy)
 

@@ -22,7 +22,6 @@ import windows
 from window_stories import STORIES
 
 GOES_ON = Path(__file__).with_name("goes_on.tsv")
-TIME = re.compile(r"\d+(\.\d+)? s\b")
 # What a report tells of the machine.
 MACHINE = re.compile(r"OMT UV [\d.]+ / .*? / mode")
 
@@ -39,7 +38,7 @@ def rows(package, folder) -> tuple[dict, dict]:
             after = left_behind.told() | left_behind.session(package)
             row = stage.told() | left_behind.changed(before, after)
             here = f"{name} {k}: {step}"
-            found[here] = {key: MACHINE.sub("mode", TIME.sub("# s", value)) for key, value in row.items()}
+            found[here] = {key: MACHINE.sub("mode", left_behind.without_times(value)) for key, value in row.items()}
             likes |= {here: last} if last else {}
             last = here
     return found, likes

@@ -35,7 +35,6 @@ BESIDES = {("bodies", "uv.omt_unwrap"): ("keep_free", "max_shear", "cut_further"
 LONG = {"uv.omt_unwrap", "uv.omt_refine", "uv.omt_magnify"}
 # Settings that the same lines take over in whatever state.
 ONCE = {"quality", "balance", "kind", "aspect", "boundary", "seams", "domain", "turn_to_fit"}
-TIME = re.compile(r"\d+(\.\d+)? s\b")
 
 
 def test_every_operator_is_called(package):
@@ -52,7 +51,7 @@ def said(capfd, choice) -> dict[str, str]:
         gives = " ".join(str(error).split())
     lines = [line for line in capfd.readouterr().out.splitlines() if line.startswith(("Info", "Warn"))]
     found = {"gives": gives} | {f"says {k}": line for k, line in enumerate(lines)}
-    return {key: TIME.sub("# s", re.sub(r"/\S*/", "/", value)) for key, value in found.items()}
+    return {key: left_behind.without_times(re.sub(r"/\S*/", "/", value)) for key, value in found.items()}
 
 
 def is_tried(state: str, choice) -> bool:

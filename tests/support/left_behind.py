@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -17,12 +18,18 @@ MOST_PIXELS = 300 * 300
 NOT_OF_MODIFIERS = {"rna_type", "name", "type", "is_active", "show_expanded", "execution_time", "persistent_uid",
                     "is_override_data", "use_pin_to_last", "show_in_editmode"}  # fmt: skip
 KINDS = ("objects", "meshes", "curves", "images", "materials", "collections", "texts", "actions", "libraries")
+TIME = re.compile(r"\d+(\.\d+)? s\b")
 # What Blender makes and drops as it likes.
 CACHES = {".corner_vert", ".corner_edge", ".edge_verts", "position"}
 
 
 # Figures by the numbers that they are of: most of what there is stays as it was.
 _KNOWN: dict[tuple, str] = {}
+
+
+def without_times(text: str) -> str:
+    """A text in which no number is one of seconds."""
+    return TIME.sub("# s", text)
 
 
 def number(value: float) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import UserError
 from ...pipelines.reading import Reading
+from ..mesh import readable
 from ..vertex_groups import group_weights
 
 GROUPS = "groups"
@@ -96,15 +97,10 @@ def _values(pairs: Pairs, name: str) -> Regions:
 
 def _face_values(obj: bpy.types.Object, name: str, kind: type) -> np.ndarray:
     """Values (f,) of an attribute of the faces of an object that has been read, in any mode."""
-    # In Edit Mode attributes tell no values.
-    mesh = obj.data.copy() if obj.data.is_editmode else obj.data
-    try:
+    with readable(obj.data) as mesh:
         values: np.ndarray = np.zeros(len(mesh.polygons), kind)
         mesh.attributes[name].data.foreach_get("value", values)
         return values
-    finally:
-        if mesh is not obj.data:
-            bpy.data.meshes.remove(mesh)
 
 
 def _by_label(labels: list[np.ndarray], called) -> Regions:
