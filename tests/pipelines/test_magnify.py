@@ -66,6 +66,19 @@ def test_different_objects_in_one_run_get_their_shares_together():
     assert region_shares(regions[::-1], swapped)[::-1] == pytest.approx(shares, rel=1e-6)
 
 
+@pytest.mark.parametrize("factor", (2.0, 4.0))
+@pytest.mark.parametrize("is_soft", (True, False))
+@pytest.mark.parametrize("surface", (meshes.hemisphere(10, 30), meshes.grid(20, 20)), ids=("dome", "plate"))
+def test_regions_of_a_mesh_have_their_share_to_less_than_a_sixth_of_a_percent(surface, is_soft, factor):
+    V, F = surface
+    for seed in range(2):
+        centre = V[np.random.default_rng(seed).integers(len(V))]
+        away = np.linalg.norm(V - centre, axis=1) / np.ptp(V, axis=0).max()
+        weights = np.clip(1.5 - away / 0.3, 0, 1) if is_soft else 1.0 * (away < 0.25)
+        found = drain(magnify([region(V, F, weights)], MagnifySettings(source="mesh", factor=factor)))
+        assert found.shares.after == pytest.approx(found.shares.target, rel=1.6e-3)
+
+
 def test_different_objects_each_in_their_own_outline():
     regions = [dome(), plate(2.0), region(*meshes.grid(3, 3), np.zeros(16), meshes.grid(3, 3)[0][:, :2] - 3)]
     result = drain(magnify(regions, MagnifySettings(source="uv", boundary="own", **DRAFT)))

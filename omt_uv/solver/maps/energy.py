@@ -23,8 +23,8 @@ import numpy as np
 
 from ..mesh.geometry import LastAnswer, Sides, Sizes, kept_hats
 
-# A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
-SHARE_ERROR = 2.7
+# A relative error of a region's share counts as so much area error: where areas may be off by 0.8 %, it may by 0.15 %;
+SHARE_ERROR = 5.4
 # and so much that of single faces of the region, or of the rest: they may be off by 1.8 %.
 FACE_ERROR = 0.45
 AT_ONCE = 100_000  # triangles whose derivatives are found at a time: on the way they take ten times their memory
