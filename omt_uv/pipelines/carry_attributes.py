@@ -18,6 +18,9 @@ from ..solver.transfer import interpolate
 from ..solver.transfer.correspondence import Correspondence
 from .attributes import TYPES, Attributes, Layer, Marks, is_uv
 
+# Where rounding puts a vertex beside the edge that it lies on, it takes this much of what lies across it, at most.
+ROUNDED = 1e-6
+
 
 def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attributes:
     """The attributes of a new mesh from those of the old one; shape keys become offsets of the new shape."""
@@ -41,7 +44,7 @@ def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attri
         marks=_carried_marks(attributes.marks, triangles, at),
         layers=tuple(layers),
         weights=at_vertices(attributes.weights) if attributes.groups else attributes.weights,
-        member=at_vertices(attributes.member) > 0 if attributes.groups else attributes.member,
+        member=at_vertices(attributes.member) > ROUNDED if attributes.groups else attributes.member,
         keys=tuple(replace(key, offsets=at_vertices(key.offsets)) for key in attributes.keys),
         folded=folded,
     )

@@ -90,7 +90,11 @@ def test_what_is_asked_for_is_written_and_nothing_else(package, objects, kinds):
 def test_landmarks_are_groups_like_others_without_a_prefix(package, objects):
     obj, attributes = carried(package)
     source = objects.Carried(None, attributes, np.eye(3), (), ())
+    obj.vertex_groups.new(name="first")
+    obj.vertex_groups.new(name="second")
+    obj.vertex_groups.active_index = 0
     assert objects.write_onto(obj, source, attributes, {"groups"}) == ["LM_1", "up"]
+    assert obj.vertex_groups.active.name == "first"
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (2, 0.5, 3)])

@@ -1,5 +1,7 @@
 """Everything that a mesh carries, on a new mesh: constants stay, and a mesh carried to itself has what it had."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -80,6 +82,16 @@ def test_what_lies_between_members_and_others_is_a_member_where_it_has_weight():
                      weights=member * rng.uniform(0.2, 1, member.shape), member=member)  # fmt: skip
     new = carry(old, triangle_surface(V, F), at)
     assert np.array_equal(new.member, new.weights > 1e-9) and 0.2 < new.member.mean() < 0.95
+
+
+def test_what_rounding_puts_beside_an_edge_is_no_member_of_what_lies_across():
+    V, F, W, G, at = mesh_and_coarser()
+    rounded = at.vertex_weights + 1e-9 * np.array([-1.0, 0.5, 0.5])
+    member = np.random.default_rng(7).random((len(V), 4)) < 0.5
+    old = Attributes(np.zeros(len(F), np.int32), np.zeros(len(F), bool), no_marks(), groups=tuple("abcd"),
+                     weights=1.0 * member, member=member)  # fmt: skip
+    exact, new = (carry(old, triangle_surface(V, F), each) for each in (at, replace(at, vertex_weights=rounded)))
+    assert np.array_equal(new.member, exact.member)
 
 
 def test_a_linear_uv_map_is_carried_as_it_is():

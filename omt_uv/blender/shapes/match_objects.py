@@ -111,11 +111,13 @@ def write_onto(
         _write_materials(obj, carried.materials, attributes.material_index)
         written.append("materials")
     if "groups" in kinds:
+        active = obj.vertex_groups.active_index
         for k, name in enumerate(attributes.groups):
             if prefix and name.startswith(prefix):
                 continue
             write_group(obj, name, np.where(attributes.member[:, k], attributes.weights[:, k], 0))
             written.append(name)
+        obj.vertex_groups.active_index = max(active, 0)
     if "shape_keys" in kinds:
         written += _write_keys(obj, attributes, np.linalg.inv(blender_mesh.stretch(obj)))
     mesh.update()
