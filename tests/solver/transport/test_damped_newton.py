@@ -99,3 +99,32 @@ def test_steps_are_halves_and_below_the_small_one_quarters(small_step, steps):
     with pytest.raises(TransportError, match="stuck"):
         drain(solve_dual(dual, np.zeros(4), first, MASS))
     np.testing.assert_allclose(found[:4], steps)
+
+
+class Rough(SoftMax):
+    """Cells that are near others are off by so much, until they have been looked at closely."""
+
+    def __init__(self, off, exact_from=1):
+        super().__init__()
+        self.off, self.exact_from, self.looks = off, exact_from, 0
+
+    def near(self, site_weights, cells):
+        exact = super().near(site_weights, cells).area
+        wrong = self.off * np.array([1, -1, 2, -2.0]) * (self.looks < self.exact_from)
+        return Areas(exact * (1 + wrong))
+
+    def confirmed(self, site_weights, cells):
+        self.looks += 1
+        return Areas(np.exp(site_weights) / np.exp(site_weights).sum())
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-8, 2e-7, 1e-6])
+@pytest.mark.parametrize("exact_from", [1, 2, 3])
+@pytest.mark.parametrize("tolerance", [5e-7, 1e-5])
+def test_what_is_told_of_a_solution_is_what_a_closer_look_says(off, exact_from, tolerance):
+    dual = Rough(off, exact_from)
+    found = run(dual, tolerance=tolerance)
+    area = np.exp(found.site_weights) / np.exp(found.site_weights).sum()
+    np.testing.assert_allclose(found.cells.area, area, rtol=1e-14)
+    assert found.residual == pytest.approx(np.max(np.abs(area - MASS) / MASS), rel=1e-6, abs=1e-15)
+    assert found.residual <= tolerance and dual.looks >= 1
