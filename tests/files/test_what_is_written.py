@@ -364,3 +364,34 @@ def test_an_object_stands_where_it_stood_however_it_is_turned(package, tmp_path,
     assert after.shape == before.shape or suffix == ".stl"
     distance = np.linalg.norm(before[:, None] - after, axis=2)
     assert max(distance.min(axis=0).max(), distance.min(axis=1).max()) < 3e-4
+
+
+# How far a channel may be off in a file, of formats that hold more or less than a byte of it.
+OFF = {".png": 0.003, ".exr": 0.003, ".hdr": 0.012, ".tif": 0.003, ".tiff": 0.003, ".jpg": 0.1, ".jpeg": 0.1}
+
+
+@pytest.mark.parametrize("floats", [False, True])
+@pytest.mark.parametrize("opaque", [False, True])
+@pytest.mark.parametrize("suffix", [".png", ".exr", ".hdr", ".tif", ".tiff", ".jpg", ".jpeg", ".tga", ".bmp"])
+def test_a_picture_that_was_saved_has_its_colours_and_its_alpha_where_the_format_has_any(
+    package, tmp_path, suffix, opaque, floats
+):
+    images = package("files.images")
+    like = bpy.data.images.new("like", 8, 6, alpha=True, float_buffer=floats)
+    x, y = np.meshgrid(np.linspace(0.3, 0.7, 8), np.linspace(0.35, 0.65, 6))
+    pixels = np.stack([x, y, 1 - x, 0.5 + 0.4 * y], axis=2).astype(np.float32)
+    if opaque:
+        pixels[..., 3] = 1
+    if floats:
+        pixels[..., :3] *= pixels[..., 3:]
+    images.save(tmp_path / f"made{suffix}", pixels, like)
+    saved = images.load(tmp_path / f"made{suffix}")
+    found, off = images.pixels_of(saved), OFF.get(suffix, 0.006)
+    # Where Blender writes bytes by itself a BMP has alpha, too.
+    has_alpha = images.FORMATS[suffix] in images.WITH_ALPHA or (suffix == ".bmp" and not floats)
+    assert np.abs(found[..., 3] - (pixels[..., 3] if has_alpha else 1)).max() < off
+    if opaque and saved.is_float == floats:
+        assert np.abs(found - pixels).max() < off
+    # Upright, and red before blue.
+    assert (np.diff(found[2, :, 0]) > 0).all() and (np.diff(found[2, :, 2]) < 0).all()
+    assert (np.diff(found[:, 3, 1]) > 0).all()
