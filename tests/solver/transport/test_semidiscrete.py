@@ -276,3 +276,40 @@ def test_hulls_diagrams_and_flips_are_counted(monkeypatch):
     # A diagram is made of a hull, or of flips of the last one.
     assert result.diagrams == made.count(1) and result.hulls == made.count(1) - made.count(0) >= 1
     assert result.flips > 0
+
+
+def straight(count):
+    """Sites on the lines of a grid: many lie on straight sides of their hull."""
+    x, y = np.meshgrid(np.linspace(-0.4, 0.4, count), np.linspace(-0.3, 0.3, count - 1))
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def scattered(count):
+    return np.random.default_rng(count).uniform(-0.4, 0.4, (count * (count - 1), 2))
+
+
+@pytest.mark.parametrize("domain", [Rectangle(1.0, 0.9), Disk(0.7)], ids=["rectangle", "disk"])
+@pytest.mark.parametrize("sites", [straight, scattered])
+@pytest.mark.parametrize("count", [4, 6, 9])
+def test_what_flips_leave_unproven_is_no_result(domain, sites, count, monkeypatch):
+    """Where the hull of the sites has straight sides, flips may come to an end that is none."""
+    made, solutions = [], []
+
+    def flipped(*given):
+        made.append(by_flips(*given))
+        return made[-1]
+
+    def solved(*given, solve_dual=semidiscrete.solve_dual):
+        solutions.append((yield from solve_dual(*given)))
+        return solutions[-1]
+
+    monkeypatch.setattr(semidiscrete, "by_flips", flipped)
+    monkeypatch.setattr(semidiscrete, "solve_dual", solved)
+    points = sites(count)
+    mass = np.random.default_rng(1).uniform(0.5, 2.0, len(points))
+    found = drain(semidiscrete.transport(points, mass, domain))
+    by_hand = [dual for dual, _ in made if dual is not None and not dual.whole]
+    assert len(made) > 1 and bool(by_hand) == (sites is straight)
+    assert not any(solutions[0].cells.dual is dual for dual in by_hand)
+    anew = power_diagram(points, found.site_weights, domain)
+    np.testing.assert_allclose(np.sort(found.cells.area), np.sort(anew.area), rtol=1e-9)
