@@ -320,3 +320,22 @@ def test_the_scale_of_colours_is_as_high_with_colours_and_without(package, monke
     monkeypatch.setattr(module.colour_bar, "icons", lambda _: [1, 2, 3])
     module.draw_bar(SimpleNamespace(column=lambda **_: column), kind)
     assert [line.labels for line in lines] == ([3, 3] if kind in ("AREA", "SHEAR") else [1, 1])
+
+
+@pytest.mark.parametrize("live", [False, True])
+@pytest.mark.parametrize("running", [False, True])
+def test_what_is_red_and_pressed_is_a_session_that_follows_the_slider_and_nothing_else(
+    package, monkeypatch, running, live
+):
+    monkeypatch.setattr(package("session.following"), "current", object() if live else None)
+    run = SimpleNamespace(fraction=0.5, stage="Packing", seconds=1.0, keys=lambda: "Esc: Cancel")
+    monkeypatch.setattr(package("session.run"), "current", run if running else None)
+    found = section(package, "unwrap", "draw")
+    red = [entry for entry in found if "a1" in entry.rpartition(")")[2]]
+    assert bool(red) == (live and not running)
+    assert all("omt_live," in entry or "balance" in entry or "pins" in entry for entry in red)
+    buttons = [entry for entry in found if entry.startswith("operator(uv.omt_live,")]
+    assert len(buttons) == (not running) and all(f"depress={live}" in entry for entry in buttons)
+    assert any(entry.startswith("operator(uv.omt_live_end") for entry in found) == (live and not running)
+    assert any(entry.startswith("operator(uv.omt_unwrap") for entry in found) == (not live and not running)
+    assert any("Esc: Cancel" in entry for entry in found) == running
