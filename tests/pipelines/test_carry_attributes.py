@@ -6,6 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.pipelines import carry_attributes
 from omt_uv.pipelines.attributes import TYPES, Attributes, Layer, Marks, ShapeKey
 from omt_uv.pipelines.carry_attributes import carry
 from omt_uv.solver.mesh.closest_point import ClosestPoint
@@ -152,3 +153,34 @@ def test_a_mesh_carried_to_itself_has_what_it_had():
     assert (
         bare and not new.marks.seam[bare].any() and not new.marks.sharp[bare].any() and not new.marks.crease[bare].any()
     )
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (1, 0, 3, 2)], ids=str)
+def test_several_layers_are_carried_as_each_of_them_alone(order, monkeypatch):
+    """Whatever comes before or after it; and folds of all are counted."""
+    V, F, W, G, at = mesh_and_coarser()
+    rng = np.random.default_rng(2)
+    # As if so many faces were left folded, of each map another number.
+    monkeypatch.setattr(carry_attributes, "straighten_folds", lambda _, uv, side: (uv, round(100 * float(uv.std()))))
+
+    def uv_map(name, values):
+        return Layer(name, "CORNER", "FLOAT2", np.asarray(values, np.float32))
+
+    tangled = rng.uniform(0, 1, (len(V), 2)).astype(np.float32)
+    layers = [
+        uv_map("straight", V[F.ravel(), :2]),
+        uv_map("tangled", tangled[F.ravel()]),
+        uv_map("more tangled", 3 * tangled[F.ravel()]),
+        Layer("of faces", "FACE", "FLOAT", rng.uniform(0, 1, (len(F), 1)).astype(np.float32)),
+    ]
+    layers = [layers[k] for k in order]
+
+    def carried(some):
+        plain = np.zeros(len(F), np.int32), np.zeros(len(F), bool), no_marks()
+        return carry(Attributes(*plain, tuple(some)), triangle_surface(V, F), at)
+
+    together, alone = carried(layers), [carried([layer]) for layer in layers]
+    for found, one in zip(together.layers, alone, strict=True):
+        assert found.name == one.layers[0].name
+        np.testing.assert_array_equal(found.values, one.layers[0].values)
+    assert together.folded == sum(one.folded for one in alone) and len({one.folded for one in alone}) == 4
