@@ -53,3 +53,22 @@ def test_the_selection_is_read_in_both_modes(package):
     assert np.flatnonzero(chosen).tolist() == sorted(obj.data.polygons[0].vertices)
     scenes.leave_edit()
     assert (groups.selected_vertices(obj) == chosen).all()
+
+
+@pytest.mark.parametrize("roles", [("centre",), ("start", "corners"), ("centre", "start", "corners")], ids=str)
+def test_markers_are_vertices_of_more_than_half_of_the_weight(package, roles):
+    """Of every object its own, and of every group that is named."""
+    groups, objects = package("blender.vertex_groups"), [scenes.bump(3, 3, name="A"), scenes.bump(4, 2, name="B")]
+    expected = []
+    for k, obj in enumerate(objects):
+        mine = {}
+        for role in ("centre", "start", "corners"):
+            weights = np.random.default_rng([k, len(role)]).random(len(obj.data.vertices)).astype(np.float32)
+            weights[:3] = 0.5, 0.0, 0.49
+            groups.write_group(obj, f"of {role}", weights)
+            mine[role] = np.flatnonzero(weights > 0.5) if role in roles else np.zeros(0, int)
+        expected.append(mine)
+    named = {role: f"of {role}" if role in roles else "" for role in ("centre", "start", "corners")}
+    for found, mine in zip(groups.map_markers(objects, named), expected, strict=True):
+        for role, vertices in mine.items():
+            np.testing.assert_array_equal(getattr(found, role), vertices, err_msg=role)

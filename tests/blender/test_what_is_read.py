@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+import numpy as np
 import pytest
 import scenes
 
@@ -92,3 +93,18 @@ def test_options_that_an_operator_does_not_have_are_left_out(package):
     known = package("blender.versions").known_options
     assert known(bpy.ops.mesh.primitive_cube_add, size=2.0, facets=9) == {"size": 2.0}
     assert known(bpy.ops.mesh.primitive_cube_add) == {}
+
+
+@pytest.mark.parametrize("slots", [0, 1, 2, 3])
+def test_an_index_beyond_the_slots_is_that_of_the_last_as_blender_draws_it(package, slots):
+    labels, obj = package("blender.measuring.region_labels"), scenes.bump(5, 1)
+    for k in range(slots):
+        obj.data.materials.append(bpy.data.materials.new(f"Slot {k}"))
+    other = scenes.bump(2, 1)
+    other.data.materials.append(bpy.data.materials.new("Other"))
+    obj.data.polygons.foreach_set("material_index", np.arange(5, dtype=np.int32))
+    pairs = [(each, package("blender.mesh").read(each)) for each in (obj, other)]
+    found = {name: masks[0].tolist() for name, masks in labels.regions_of(pairs, labels.MATERIALS) if name != "Other"}
+    at = np.minimum(np.arange(5), max(slots - 1, 0))
+    names = [f"Slot {k}" for k in range(slots)] or ["no material"]
+    assert found == {name: (at == k).tolist() for k, name in enumerate(names)}

@@ -17,7 +17,7 @@ OF_THE_MACHINE = ("blas_threads", "freed_memory")
 # Of a search: begun empty, and filled by it.
 FILLED = {f"ShearSearch.{name}" for name in ("memory", "models", "rehearsals", "borders", "thinned")}
 # Runs that ask for what is kept, and take little time.
-RUNS = ("unwrapped", "bodies_cut_open", "magnified", "new_meshes", "in_contact", "moved_by_flows", "signed", "matched")
+RUNS = ("unwrapped", "bodies_cut_open", "magnified", "new_meshes", "in_contact", "moved_by_flows", "matched")
 
 
 class KeptProperty:
