@@ -38,7 +38,7 @@ def fin(obj):
     mesh.free()
 
 
-def flipped(obj):
+def turned(obj):
     for face in (3, 40):
         obj.data.polygons[face].flip()
 
@@ -58,9 +58,9 @@ def thin(obj):
 
 RUNS = {
     "unwrap a fin": ("uv.omt_unwrap", {"quality": "DRAFT", "max_shear": 0.0}, fin),
-    "unwrap flipped faces": ("uv.omt_unwrap", {"quality": "DRAFT", "max_shear": 0.0}, flipped),
+    "unwrap faces turned over": ("uv.omt_unwrap", {"quality": "DRAFT", "max_shear": 0.0}, turned),
     "remesh texts": ("object.omt_remesh", {"target_vertices": 20}, texts),
-    "remesh flipped faces": ("object.omt_remesh", {"target_vertices": 20}, flipped),
+    "remesh faces turned over": ("object.omt_remesh", {"target_vertices": 20}, turned),
     "cells of few faces": ("mesh.omt_partition", {"cells": 30, "relax": 0, "write": "FACE_SETS"}, thin),
 }
 
