@@ -23,6 +23,9 @@ ARCHIVE = os.environ.get("OMT_UV_DEBIAN", "http://deb.debian.org/debian")
 PACKAGES = "blender xdotool imagemagick libgl1 libegl1 libgl1-mesa-dri python3-scipy python3-cattr python3-requests"
 # Lists of a mirror that is behind, or of a snapshot, have run out; they are signed all the same.
 LISTS = 'Acquire::Check-Valid-Until "false";\n'
+# The library that volumes need, which Debian has not, and where a root has it.
+TETGEN = next(line for line in (ROOT / "requirements-dev.txt").read_text().splitlines() if line.startswith("tetgen"))
+PYTHON_PACKAGES = Path("usr/lib/python3/dist-packages")
 # What a root needs of the machine it is on.
 SHARED = ("etc/resolv.conf",)
 MOUNTED = ("proc", "sys", "dev")
@@ -68,6 +71,17 @@ def make(age: Age) -> None:
     enter(age, f"DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends {PACKAGES}", check=True)
 
 
+def give_tetgen(age: Age) -> None:
+    """Put the library that volumes need into a root, as a wheel for its Python; nothing if it is there."""
+    folder = age.root / PYTHON_PACKAGES
+    if (folder / "tetgen").exists():
+        return
+    names = [path.name.removeprefix("python") for path in (age.root / "usr/bin").glob("python3.*")]
+    version = next(name for name in names if name.replace(".", "").isdigit())
+    wheels = ["--target", str(folder), "--python-version", version, "--only-binary=:all:", "--no-deps"]
+    subprocess.run([sys.executable, "-m", "pip", "install", "-q", *wheels, TETGEN], check=True)
+
+
 def enter(age: Age, script: str, check: bool = False) -> subprocess.CompletedProcess:
     """Run a line of the shell in a root, with what it needs mounted as long as it takes."""
     lines = [f"mountpoint -q {age.root}/{n} || mount --rbind /{n} {age.root}/{n}" for n in MOUNTED]
@@ -110,6 +124,9 @@ def main(names: list[str]) -> int:
     for age in missing:
         print(f"Making a root for Blender of Debian {age.suite} in {age.root}", flush=True)
         make(age)
+    for age in AGES:
+        if age.suite and age.is_there() and (not names or age.name in names):
+            give_tetgen(age)
     return 0
 
 
