@@ -16,15 +16,20 @@ def tell(story):
     tab = yield from story.tab("VIEW_3D")
     yield from tab.open("volume")
     yield from story.shoot("volume")
-    chosen = bpy.context.window_manager.operator_properties_last("object.omt_volume")
+    chosen = last_chosen()
     chosen.tets, chosen.shells, chosen.result = TETS, SHELLS, "SHELLS"
     story.facts["shells"] = yield from made(story, tab, obj)
     yield from story.shoot("shells")
-    chosen.result = "SLICE"
+    last_chosen().result = "SLICE"
     story.facts["slice"] = yield from made(story, tab, obj)
     for each in bpy.data.objects:
         each.hide_set(each.name not in story.facts["slice"]["new"])
     yield from story.shoot("slice")
+
+
+def last_chosen():
+    """What the section shows, and the next click takes; each run may leave it elsewhere."""
+    return bpy.context.window_manager.operator_properties_last("object.omt_volume")
 
 
 def made(story, tab, obj):
