@@ -78,6 +78,7 @@ def test_what_is_told_of_the_way_never_goes_back():
 
 def run_all():
     """The record of all runs, and figures of what functions give in them."""
+    recorded_calls.forget([solver_runs])
     told = recorded_calls.Told(MOST)
     with pytest.MonkeyPatch.context() as patch, contextlib.ExitStack() as stack:
         for module in [*recorded_calls.modules(), solver_runs]:
@@ -373,11 +374,8 @@ def shaken(seed):
     with pytest.MonkeyPatch.context() as patch:
         for name in ("patch", "body"):
             patch.setattr(solver_runs, name, functools.partial(_shaken, getattr(solver_runs, name), seed))
-        for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
-            cached.cache_clear()
         kept = run_all()
-    for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
-        cached.cache_clear()
+    recorded_calls.forget([solver_runs])
     return kept
 
 
