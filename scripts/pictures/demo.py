@@ -21,11 +21,15 @@ from renders import VIEWS, View, checker_material, render_checker, render_colour
 from textures import checker, equal_density
 
 from benchmarks.cases import load_case, meshes, our_uv
+from benchmarks.parts.clicks import one_click
 from benchmarks.rivals import METHODS, make_object, unwrap, write_uv
 from benchmarks.tables import Table
 from benchmarks.timing import timed
 from omt_uv.solver.maps.distortion import distortion, face_distortion
+from omt_uv.solver.mesh.surface import triangle_surface
 
+ONE_CLICK = "OMT UV one click"  # as *Unwrap* does, with nothing else set
+# Along the seams that are there, as Blender's own.
 OURS = {
     "OMT UV free": ("free", "standard"),
     "OMT UV free exact": ("free", "exact"),
@@ -34,7 +38,7 @@ OURS = {
 }
 COLUMNS = {"area_l1": 8, "area_sd": 8, "angle_mean": 10, "folds": 5, "overlap": 8, "seconds": 8}
 CELLS = 300  # checker cells on the model
-SHOWN = ("Blender Angle Based", "Blender Minimum Stretch 50", "OMT UV free")  # in pictures
+SHOWN = ("Blender Angle Based", "Blender Minimum Stretch 50", ONE_CLICK)  # in pictures
 
 
 def all_maps(case):
@@ -42,9 +46,19 @@ def all_maps(case):
     for method in METHODS:
         found = unwrap(case.V, case.F, case.seams, method)
         yield f"Blender {method}", found.uv, found.processor_seconds
+    yield ONE_CLICK, *by_one_click(case)
     for name, (boundary, quality) in OURS.items():
         (uv, _), seconds = timed(lambda b=boundary, q=quality: our_uv(case, b, q))
         yield name, uv, seconds
+
+
+def by_one_click(case):
+    """Corner UVs (m,3,2) with seams that are found, and processor seconds."""
+    surface = triangle_surface(case.V, case.F, case.seams)
+    layout, seconds = one_click(surface)
+    uv = np.zeros((len(surface.corner_vertex), 2))
+    uv[layout.corners[0]] = layout.uv[0]
+    return uv[surface.triangles], seconds
 
 
 def add_objects(case, maps, material, up):
@@ -74,7 +88,7 @@ def slug(name):
 
 def measured(case, folder):
     """Corner UVs (m,3,2) by method, and their figures as a table, printed and written."""
-    table = Table(f"{case.name}, {len(case.F)} triangles: distortion of one chart", {"method": 28} | COLUMNS)
+    table = Table(f"{case.name}, {len(case.F)} triangles: distortion", {"method": 28} | COLUMNS)
     maps = {}
     for name, uv, seconds in all_maps(case):
         figures = distortion(case.V, case.F, uv)
