@@ -15,7 +15,7 @@ from benchmarks.cases import polygon_model
 from benchmarks.part import MODELS, Part
 from benchmarks.tables import Table, missed
 from benchmarks.timing import timed
-from omt_uv.pipelines.layout import UnwrapJob
+from omt_uv.pipelines.layout import Layout, UnwrapJob
 from omt_uv.pipelines.reading import Y_UP
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import DEFAULT_MAX_SHEAR, Settings
@@ -42,14 +42,20 @@ def one_click(surface: Surface, **settings):
     return timed(lambda: drain(lay_out([UnwrapJob(surface, axes=Y_UP)], chosen)))
 
 
+def uv_of(surface: Surface, layout: Layout) -> np.ndarray:
+    """UVs (c,2) of the corners of the only surface of a layout."""
+    uv = np.zeros((len(surface.corner_vertex), 2))
+    uv[layout.corners[0]] = layout.uv[0]
+    return uv
+
+
 def clicks_table(args) -> Table:
     """One row for every model."""
     table = Table("One click", COLUMNS)
     for name in args.models or [m for m in DEFAULT_MODELS if meshes.model_path(m)]:
         surface = polygon_model(name)
         layout, seconds = one_click(surface)
-        uv = np.zeros((len(surface.corner_vertex), 2))
-        uv[layout.corners[0]] = layout.uv[0]
+        uv = uv_of(surface, layout)
         F, mapped = surface.corner_vertex[surface.triangles], uv[surface.triangles]
         cut = value_jumps(F, surface.triangles, uv, SAME_UV * np.ptp(uv, axis=0).max())
         _, plain = one_click(replace(surface, seams=cut), max_shear=0.0, seams="existing")

@@ -21,7 +21,7 @@ from renders import VIEWS, View, checker_material, render_checker, render_colour
 from textures import checker, equal_density
 
 from benchmarks.cases import load_case, meshes, our_uv
-from benchmarks.parts.clicks import one_click
+from benchmarks.parts.clicks import one_click, uv_of
 from benchmarks.rivals import METHODS, make_object, unwrap, write_uv
 from benchmarks.tables import Table
 from benchmarks.timing import timed
@@ -56,9 +56,7 @@ def by_one_click(case):
     """Corner UVs (m,3,2) with seams that are found, and processor seconds."""
     surface = triangle_surface(case.V, case.F, case.seams)
     layout, seconds = one_click(surface)
-    uv = np.zeros((len(surface.corner_vertex), 2))
-    uv[layout.corners[0]] = layout.uv[0]
-    return uv[surface.triangles], seconds
+    return uv_of(surface, layout)[surface.triangles], seconds
 
 
 def add_objects(case, maps, material, up):

@@ -48,15 +48,10 @@ RARE = " rarely"
 MOST_OF_ALL = 0.85
 
 
-def _forget():
-    """Meshes that `solver_runs` has made are made again by whoever asks next, and seen."""
-    for cached in (solver_runs._flat, solver_runs._flat_curved, solver_runs._ball):
-        cached.cache_clear()
-
-
 def told():
     """The record of all runs: figures of what functions give, by their names, and calls of them."""
-    _forget()
+    # What other tests have made is made again, and seen.
+    recorded_calls.forget([solver_runs])
     record = other_input.Asked(MOST)
     everything = [*recorded_calls.modules(), solver]
     watched = recorded_calls.watching(record, everything, private=True, callers=(seldom_runs, rare_runs), held=True)
@@ -75,7 +70,7 @@ def told():
             if name not in LEFT_OUT:
                 record.next_run(SMALL + " of symmetric meshes" * (name in ("with_symmetry", "bodies_cut_open")))
                 run()
-    _forget()
+    recorded_calls.forget([solver_runs])
     return record
 
 
