@@ -48,7 +48,8 @@ def mesh_objects(context: bpy.types.Context, shared: bool = False) -> list[bpy.t
     else:
         objects = [obj for obj in context.selected_objects if obj.type == "MESH"]
     objects.sort(key=lambda obj: obj != context.view_layer.objects.active)
-    unique = objects if shared else list({obj.data: obj for obj in reversed(objects)}.values())[::-1]
+    first = {obj.data: obj for obj in reversed(objects)}
+    unique = objects if shared else [obj for obj in objects if first[obj.data] == obj]
     if not unique:
         raise Complaint("No mesh is selected. Select one or more mesh objects.")
     return unique

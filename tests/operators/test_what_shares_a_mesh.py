@@ -203,3 +203,28 @@ def test_uvs_of_a_new_mesh_are_looked_at_once_for_all_that_have_it(package, monk
     for _, made in looked:
         meshes = [bpy.data.objects[name].data for name in made]
         assert len(set(meshes)) == len(meshes) == levels
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("active", range(4))
+@pytest.mark.parametrize("meshes_of", ["aabb", "abab", "abba", "aaab", "baaa", "abaa"])
+def test_of_objects_with_a_mesh_for_each_the_active_one_comes_first(package, mode, active, meshes_of):
+    """Whichever share one: what is read, told or made of one object is that of the active one."""
+    scenes.open_empty()
+    first = {letter: body(letter, k) for k, letter in enumerate(sorted(set(meshes_of)))}
+    objects = []
+    for k, letter in enumerate(meshes_of):
+        obj = bpy.data.objects.new(f"{k}{letter}", first[letter].data)
+        bpy.context.collection.objects.link(obj)
+        objects.append(obj)
+    scenes.select([obj for obj in objects if obj != objects[active]] + [objects[active]])
+    if mode == "EDIT":
+        bpy.ops.object.mode_set(mode="EDIT")
+    base = package("operators.base")
+    one, every = base.mesh_objects(bpy.context), base.mesh_objects(bpy.context, shared=True)
+    if mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    assert one[0].data == objects[active].data and every[0].data == objects[active].data
+    assert [obj.data for obj in one] == list({obj.data: 0 for obj in every}) and len(one) == 2
+    if mode == "OBJECT":
+        assert one[0] == every[0] == objects[active] and len(every) == 4

@@ -59,9 +59,8 @@ class OBJECT_OT_omt_diagram(SolverOperator, bpy.types.Operator):
     def steps(self, context: bpy.types.Context):
         from ...pipelines.measuring.diagrams import diagram
 
-        pairs = read_objects(context)
-        active = context.view_layer.objects.active
-        obj, reading = next((pair for pair in pairs if pair[0] == active), pairs[0])
+        # The active one, if it is among them.
+        obj, reading = read_objects(context)[0]
         with complaints(obj):
             found = yield from run.aside(diagram(reading.surface, reading.faces, self.domain.lower()))
         return obj, found
