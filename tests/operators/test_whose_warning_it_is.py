@@ -47,6 +47,10 @@ def texts(obj):
     obj.data.attributes.new("words", "STRING", "POINT")
 
 
+def displaced(obj):
+    obj.modifiers.new("Wave", "DISPLACE")
+
+
 def thin(obj):
     """So slender that cells are torn where they follow faces."""
     mesh = bmesh.new()
@@ -59,6 +63,9 @@ def thin(obj):
 RUNS = {
     "unwrap a fin": ("uv.omt_unwrap", {"quality": "DRAFT", "max_shear": 0.0}, fin),
     "unwrap faces turned over": ("uv.omt_unwrap", {"quality": "DRAFT", "max_shear": 0.0}, turned),
+    "unwrap before a modifier": ("uv.omt_unwrap", {"quality": "DRAFT", "max_shear": 0.0}, displaced),
+    "seams of a fin": ("uv.omt_seams", {"max_shear": 0.0}, fin),
+    "seams of faces turned over": ("uv.omt_seams", {"max_shear": 0.0}, turned),
     "remesh texts": ("object.omt_remesh", {"target_vertices": 20}, texts),
     "remesh faces turned over": ("object.omt_remesh", {"target_vertices": 20}, turned),
     "cells of few faces": ("mesh.omt_partition", {"cells": 30, "relax": 0, "write": "FACE_SETS"}, thin),

@@ -131,3 +131,24 @@ def test_a_level_that_cannot_be_applied_is_refused(why):
     with pytest.raises(RuntimeError, match=why):
         bpy.ops.uv.omt_remedy(action="APPLY_LEVEL")
     assert len(obj.data.polygons) == 6 and obj.modifiers[-1].levels == 1
+
+
+@pytest.mark.parametrize("action", ["MERGE", "NORMALS", "DISSOLVE", "APPLY_LEVEL"])
+def test_what_never_ends_on_faces_that_use_a_vertex_twice_is_not_begun(package, monkeypatch, action):
+    """Of several objects none is touched where one of them has such a face, and that one is named."""
+    good = scenes.cube("Good")
+    bad = scenes.add([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3), (0, 1, 2, 1)], "Bad")
+    scenes.select([bad, good])
+    package("session.last_run").forget()
+    begun = []
+    for module, names in (
+        ("blender.clean", ("merge", "turn_outside", "dissolve")),
+        ("blender.subdivision", ("apply_level",)),
+    ):
+        for name in names:
+            monkeypatch.setattr(package(module), name, lambda obj: begun.append(obj.name) or 0)
+    if action in ("MERGE", "NORMALS"):
+        said = scenes.error_of(bpy.ops.uv.omt_remedy, action=action)
+        assert "Bad" in said and "uses a vertex twice" in said and not begun
+    else:
+        assert bpy.ops.uv.omt_remedy(action=action) == {"FINISHED"} and sorted(begun) == ["Bad", "Good"]
