@@ -1,6 +1,7 @@
 """Where a head looks to: where its nose and sockets are, however it is turned, and whatever was told to be up."""
 
 import functools
+from itertools import product
 
 import meshes
 import numpy as np
@@ -269,3 +270,32 @@ def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():
 )
 def test_published_heads_look_where_their_faces_are(name, front):
     assert facing(*published(name), None).front @ front > np.cos(np.pi / 4)
+
+
+STANDING = {
+    "figure": lambda: figure(),
+    "wagon": lambda: figure(0.1),
+    "beast": lambda: beast(0.5),
+    "beast that overhangs nothing": lambda: beast(0.0),
+    "head": lambda: meshes.head(12),
+    "sphere": lambda: meshes.icosphere(2),
+}
+
+
+@pytest.mark.parametrize("body", STANDING)
+@pytest.mark.parametrize("place", [*product((-1, 1), repeat=3), (0, 0, 1), (0, 0, -1)], ids=str)
+def test_vertices_of_no_face_say_nothing_wherever_they_lie(body, place):
+    """A beast has them under its feet, ahead and behind: what is told of it is told of its faces alone."""
+    V, F = STANDING[body]()
+    V = unit_size(V, F)
+    more = np.concatenate([V, V.mean(axis=0) + np.outer([3, 2], place)])
+    plane = SymmetryPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, None)
+    tail = np.where(V[:, 0] < V[:, 0].min() + 0.1 * np.ptp(V[:, 0]), 1.0, 0.0) * np.linspace(0.5, 1, len(V))
+    for axes in (SceneAxes((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)), SceneAxes((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))):
+        for saliency_of in (np.zeros(len(V)), tail):
+            salient = np.concatenate([saliency_of, [0.0, 1.0]])
+            one, other = facing(V, F, saliency_of, plane, axes), facing(more, F, salient, plane, axes)
+            np.testing.assert_allclose(other.front, one.front, atol=1e-9)
+            assert (other.certainty, other.beast) == pytest.approx((one.certainty, one.beast))
+            told = [standing(points, F, s, plane, axes) for points, s in ((V, saliency_of), (more, salient))]
+            np.testing.assert_allclose(*([x.up, x.viewer] for x in told), atol=1e-9)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
+from dataclasses import replace
 
+import meshes
 import numpy as np
 import pytest
 
@@ -61,3 +64,40 @@ def test_islands_laid_side_by_side_keep_their_shapes_in_rows_of_a_square(seed):
             assert high[one, 0] + 0.01 * side + given[other, 0] > wide
         else:
             assert low[other, 1] == low[one, 1]
+
+
+def telling(name, function, said):
+    """A function whose results say one thing more, which is kept; as it is if they say nothing."""
+
+    def more(found):
+        if not isinstance(getattr(found, "warnings", None), tuple):
+            return found
+        said.append(f"{name} has said {len(said)}")
+        return replace(found, warnings=(*found.warnings, said[-1]))
+
+    def whole(run):
+        return more((yield from run))
+
+    def told(*given, **options):
+        found = function(*given, **options)
+        return whole(found) if inspect.isgenerator(found) else more(found)
+
+    return told
+
+
+@pytest.mark.parametrize("name", ["unwrap", "refine", "magnify"])
+def test_whatever_a_part_of_it_says_a_step_says(monkeypatch, name):
+    """Two islands and whatever is called for them."""
+    V, F = meshes.quad_grid(4, 3)[0], np.array(meshes.quad_grid(4, 3)[1])
+    V, F = np.concatenate([V, V + [9, 0, 0]]), np.concatenate([F, F + len(V)])
+    weights = (V[:, 0] % 9 < np.median(V[:, 0] % 9)).astype(float)
+    more = {"unwrap": (), "refine": (V[F][:, :, :2],), "magnify": (V[F][:, :, :2], weights, 1.2)}[name]
+    said = []
+    for part, function in list(vars(steps).items()):
+        # What a density says is said by what asks for it.
+        if inspect.isfunction(function) and function.__module__ != steps.__name__ and part != "target_density":
+            monkeypatch.setattr(steps, part, telling(part, function, said))
+    monkeypatch.setattr(steps.unwrapping, "unwrap", telling("a map", steps.unwrapping.unwrap, said))
+    found = drain(getattr(steps, name)(V, F, *more))
+    assert len(said) >= (1 if name == "unwrap" else 3)
+    assert set(said) <= set(found.warnings) and len(set(found.warnings)) == len(found.warnings)

@@ -7,9 +7,10 @@ import tracemalloc
 import hard_meshes
 import numpy as np
 import pytest
-from flat_islands import FAN, corner, corners, least_distance, outline
+from flat_islands import FAN, corner, corners, least_distance, outline, rotation
 
 from omt_uv.solver.errors import MarginError
+from omt_uv.solver.mesh.geometry import cross2
 from omt_uv.solver.packing import pack_square
 from omt_uv.solver.packing.pack_square import stack
 from omt_uv.solver.progress import drain
@@ -273,3 +274,18 @@ def test_no_order_is_tried_twice_at_a_scale(monkeypatch):
     square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     pack([square, 2 * square, square * [3, 0.5]], [np.array([[0, 1, 2], [0, 2, 3]])] * 3)
     assert len(tried) > 6 and len(set(tried)) == len(tried)
+
+
+@pytest.mark.parametrize("quarters", range(4))
+@pytest.mark.parametrize("shift", [(-0.3, 0.1), (0.1, -0.3), (-0.3, -0.25), (0.6, 0.7), (0.75, 0.2)], ids=str)
+def test_what_stays_keeps_its_room_where_it_lies_over_a_border(shift, quarters):
+    """A slender L, at every side and corner of the square: nothing comes nearer to it than the margin."""
+    turn = rotation(quarters * np.pi / 2).round()
+    stays = (corner(0.8, 0.45) + shift - 0.5) @ turn.T + 0.5
+    found = pack(corners(5), [FAN] * 5, 8, 256, [(stays, FAN)]).islands
+    points = np.concatenate([outline(p) for p in found])
+    assert points.min() >= 4 / 256 - 1e-9 and points.max() <= 1 - 4 / 256 + 1e-9
+    assert least_distance([*found, stays]) >= 8 / 256 - 1e-9
+    sides = [cross2(stays[b] - stays[a], points - stays[a]) for a, b in zip(FAN, np.roll(FAN, -1, axis=1), strict=True)
+             for a, b in zip(a, b, strict=True)]  # fmt: skip
+    assert not (np.reshape(sides, (len(FAN), 3, -1)) > 0).all(axis=1).any()

@@ -12,7 +12,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.seams import coarse_cut, improvement, search
+from omt_uv.solver.seams import coarse_cut, growth, improvement, search
 from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.cut_tree import Removal, Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
@@ -313,3 +313,18 @@ def test_a_density_counts_by_its_ratios_alone():
         for c in (1.0, 1e3)
     ]
     assert len(cuts[0]) and np.array_equal(*cuts)
+
+
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.1])
+@pytest.mark.parametrize("worth", [0.0, np.inf])
+def test_what_has_no_cut_gets_its_best_arc_whatever_that_is_worth_and_others_have_to_be_worth_theirs(
+    monkeypatch, cap, share, worth
+):
+    task = task_of(cap, 0.0)
+    task = replace(task, bound=share * task.model.spread)
+    monkeypatch.setattr(growth, "LEAST_WORTH", worth)
+    whole = cut_along(task, np.zeros(0, np.int64))
+    found = list(growth.growing(task, whole))
+    assert found and len(found[0].steps) and found[0].spread < whole.spread
+    assert len(found) == 1 or worth == 0
+    assert worth == 0 or not list(growth.growing(task, found[0]))
