@@ -155,3 +155,22 @@ def test_detail_is_laid_over_what_is_magnified(run, tmp_path):
     assert tuple(new.size) == (96, 96) and 0.06 < red < 0.25
     assert run(*files, "--detail", f"{tmp_path / 'fine.png'}:0.4,0.3,0.2,0.7")[0] == 1
     assert run(*files, "--detail", f"{tmp_path / 'none.png'}:0.2,0.3,0.4,0.7")[0] == 1
+
+
+@pytest.mark.parametrize("size", [(32, 16), (16, 40), (64, 1)], ids=str)
+@pytest.mark.parametrize("wide", [0, 24])
+@pytest.mark.parametrize("detail", [False, True])
+def test_a_picture_keeps_its_proportions_whatever_its_width(run, tmp_path, size, wide, detail):
+    two_regions(tmp_path)
+    for name, (width, height) in (("map", size), ("fine", (4, 8))):
+        image = bpy.data.images.new(name, width, height)
+        image.filepath_raw, image.file_format = str(tmp_path / f"{name}.png"), "PNG"
+        image.save()
+    options = ["--source", "uv", "--weights", "left", "--factor", 1.5, "--quality", "draft"]
+    options += ["--image", tmp_path / "map.png", "--image-output", tmp_path / "new.png"]
+    options += ["--image-size", wide] if wide else []
+    options += ["--detail", f"{tmp_path / 'fine.png'}:0.2,0.3,0.4,0.7"] if detail else []
+    status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "o.blend", *options)
+    assert status == 0, err
+    width, height = bpy.data.images.load(str(tmp_path / "new.png")).size
+    assert width == (wide or size[0]) and height == max(1, round(size[1] * width / size[0]))

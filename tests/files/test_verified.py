@@ -211,3 +211,26 @@ def test_a_file_keeps_its_owner_group_and_mode(tmp_path, mode):
     verified.write_text(path, "new")
     found = path.stat()
     assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (65534, 1, mode) and path.read_text() == "new"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes of files are those of POSIX")
+@pytest.mark.parametrize(
+    "modes", [(0o600, 0o644, 0o640), (0o644, 0o600, None), (None, 0o640, 0o600), (0o604, None, None)]
+)
+def test_every_file_that_is_replaced_keeps_its_own_mode_and_new_ones_have_none_of_another(tmp_path, modes):
+    """Of a file and two companions each has what stood in its own place."""
+    places = [tmp_path / name for name in ("out.obj", "a.mtl", "b.mtl")]
+    for path, mode in zip(places, modes, strict=True):
+        if mode is not None:
+            path.write_text("old")
+            path.chmod(mode)
+    companions: dict[Path, Path] = {}
+    with verified.staged(places[0], companions) as made:
+        parts = [made, made.with_suffix(".a"), made.with_suffix(".b")]
+        for part in parts:
+            part.write_text("new")
+        usual = [part.stat().st_mode & 0o777 for part in parts]
+        companions.update(zip(parts[1:], places[1:], strict=True))
+    assert [path.read_text() for path in places] == ["new"] * 3
+    kept = [path.stat().st_mode & 0o777 for path in places]
+    assert kept == [a if b is None else b for a, b in zip(usual, modes, strict=True)]

@@ -11,6 +11,7 @@ from readings import reading
 from sphere_shapes import blob
 
 from omt_uv.pipelines import globe, subdivision, unwrap
+from omt_uv.pipelines.arranging.found import arranged, islands_of
 from omt_uv.pipelines.layout import UnwrapJob
 from omt_uv.pipelines.regions import several
 from omt_uv.pipelines.shapes import match, partition, signature_index
@@ -311,3 +312,16 @@ def test_landmarks_have_the_numbers_of_the_part_and_of_none_where_they_are_elsew
     assert [p.vertex for p in found.target] == [1, 2] and [p.name for p in found.target] == ["a", "b"]
     other = match._renamed(Pairs((LandmarkPoint("c", 3, None),), (LandmarkPoint("c", 1, None),)), source, target)
     assert [other.source[0].vertex, other.target[0].vertex] == [3, 2]
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("given", [[], [(0, "one")], [(-1, "all"), (0, "one")]])
+def test_whether_islands_grew_together_or_not_all_else_is_said(apart, given):
+    V, F = meshes.grid(2, 2)
+    W, G = np.concatenate([V, V + [9, 0, 0]]), np.concatenate([F, F + len(V)])
+    found = islands_of([reading(W, G, W[:, :2].copy())])
+    beside = arranged(1, found, [each.island.uv for each in found], 2, given, apart)
+    over = arranged(1, found, [found[0].island.uv] * 2, 2, given, apart)
+    assert beside.warnings == given and over.warnings[: len(given)] == given
+    more = over.warnings[len(given) :]
+    assert len(more) == apart and all(k == -1 and "grew into each other" in text for k, text in more)
