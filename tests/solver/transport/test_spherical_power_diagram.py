@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from omt_uv.solver.errors import TransportError
 from omt_uv.solver.mesh.topology import twins
@@ -85,3 +86,21 @@ def test_a_step_to_cells_that_are_none_is_not_taken(monkeypatch):
     assert SphereDual(points).near(np.zeros(len(points)), cells) is not None
     points[triangles[5, 1]] = points[triangles[5, 0]]
     assert SphereDual(points).near(np.zeros(len(points)), cells) is None
+
+
+@pytest.mark.parametrize("site", [0, 17, 60])
+@pytest.mark.parametrize("off", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_a_site_is_hidden_from_the_very_weight_on_at_which_it_lies_in_the_hull_of_the_others(sites, site, off):
+    """Flips and hulls agree on either side of it, however near."""
+    others = ConvexHull(np.delete(sites, site, axis=0)).equations
+    outward = others[:, :3] @ sites[site]
+    bound = np.log((-others[:, 3] / outward)[outward > 0].min())
+    near, weights = by_hull(sites, np.zeros(len(sites))), np.zeros(len(sites))
+    weights[site] = bound - off
+    assert by_flips(near, sites, weights) == (None, True)
+    with pytest.raises(TransportError):
+        by_hull(sites, weights)
+    weights[site] = bound + off
+    found, hidden = by_flips(near, sites, weights)
+    faces = [{tuple(sorted(face)) for face in hull.triangles.tolist()} for hull in (found, by_hull(sites, weights))]
+    assert faces[0] == faces[1] and not hidden

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -78,3 +80,22 @@ def test_samples_beyond_a_chord_are_pulled_to_a_share_of_its_length_from_it():
         moved += np.linalg.norm(before) > most
         np.testing.assert_allclose(after, before * min(1, most / np.linalg.norm(before)), rtol=0, atol=1e-12)
     assert 5 < moved < 25
+
+
+@pytest.mark.parametrize("empty", [[], [0], [3, 4], range(20)])
+def test_samples_whose_cells_are_empty_stay_and_the_others_go_to_the_middles_of_theirs(monkeypatch, empty):
+    """Cells without area have no middle: whatever stands for it is not taken."""
+    empty, turns = np.array(empty, int), []
+
+    def diagram(points, weights, domain):
+        turns.append(points)
+        area, middle = np.ones(len(points)), 0.5 * points
+        area[12 + empty], middle[12 + empty] = 0.0, np.nan
+        return SimpleNamespace(area=area, centroid=middle)
+
+    start = spread_samples(circle(12), 20, 0)
+    monkeypatch.setattr(disk_samples, "power_diagram", diagram)
+    found = spread_samples(circle(12), 20, 3)
+    share = np.where(np.isin(np.arange(20), empty), 1.0, 0.5**3)
+    np.testing.assert_allclose(found, share[:, None] * start, rtol=1e-12)
+    assert all((points[:12] == circle(12)).all() for points in turns) and len(turns) == 3
