@@ -395,3 +395,15 @@ def test_a_picture_that_was_saved_has_its_colours_and_its_alpha_where_the_format
     # Upright, and red before blue.
     assert (np.diff(found[2, :, 0]) > 0).all() and (np.diff(found[2, :, 2]) < 0).all()
     assert (np.diff(found[:, 3, 1]) > 0).all()
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.95])
+def test_a_file_that_ends_early_is_seen_whatever_it_says_it_holds(package, tmp_path, suffix, share):
+    obj = patch("Patch")
+    path = written(package, tmp_path, suffix, obj)
+    package("files.read_back").check(path, suffix, [obj])
+    ends = next(tmp_path.glob("*.bin"), path)
+    ends.write_bytes(ends.read_bytes()[: int(share * ends.stat().st_size)])
+    with pytest.raises(package("errors").UserError, match="Is the disk full"):
+        package("files.read_back").check(path, suffix, [obj])

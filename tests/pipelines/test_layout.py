@@ -1,5 +1,7 @@
 """What pipelines share: packing into tiles, the way back to corners, and what is said of islands that overlap."""
 
+import dataclasses
+
 import meshes
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from omt_uv.errors import UserError
 from omt_uv.pipelines import layout
 from omt_uv.pipelines.layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together, pack_islands
+from omt_uv.pipelines.reading import Reading
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import FIRST_TILE, Settings
 from omt_uv.solver.analysis.facing import SceneAxes
@@ -175,3 +178,14 @@ def test_what_markers_say_is_not_turned():
     (along, _), (other, _) = (np.linalg.svd(np.diff(one.uv[1][[0, 5]], axis=0))[2] for one in both)
     assert abs(along @ other) == pytest.approx(1, abs=1e-3) or abs(along @ other) == pytest.approx(0, abs=1e-3)
     assert both[1].packing.scale > 1.05 * both[0].packing.scale
+
+
+def test_a_job_has_all_of_what_was_read_that_it_has_a_name_for():
+    """Each field of a reading, whichever they are, and what is given beside it."""
+    names = {field.name for field in dataclasses.fields(UnwrapJob)}
+    of = Reading(**{field.name: object() for field in dataclasses.fields(Reading)} | {"uv": None, "pinned": None})
+    job = UnwrapJob.of(of, "levels", "avoided", "marked")
+    shared = names & {field.name for field in dataclasses.fields(Reading)} - {"subdivision"}
+    assert shared >= {"surface", "faces", "axes", "was_split"}
+    assert all(getattr(job, name) is getattr(of, name) for name in shared)
+    assert (job.subdivision, job.avoid, job.markers, job.pins) == ("levels", "avoided", "marked", None)

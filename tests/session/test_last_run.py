@@ -146,3 +146,18 @@ def test_the_panel_is_brought_up_to_date_once_it_is_quiet(package, monkeypatch):
     assert timers == {last_run._look: last_run.PATIENCE}
     last_run.forget()
     assert not timers
+
+
+@pytest.mark.parametrize("go_on", ["keep", "forget"])
+def test_nothing_of_the_run_before_is_left(package, go_on):
+    """Each field of what the panel knows is as in the beginning, but for what is kept."""
+    last_run = package("session.last_run")
+    kept = last_run.Summary("Unwrap", notices=(last_run.Notice("One"), last_run.Notice("Two")))
+    last_run.state.summary, last_run.state.shown, last_run.state.outdated = kept, 1, "the mesh has changed"
+    last_run.state.marks = {"Gone": b"mark"}
+    new = last_run.Summary("Refine")
+    last_run.keep(new) if go_on == "keep" else last_run.forget()
+    state, fresh = last_run.state, last_run.State()
+    assert state.summary is (new if go_on == "keep" else None)
+    assert (state.shown, state.outdated, state.marks) == (fresh.shown, fresh.outdated, fresh.marks)
+    last_run.forget()

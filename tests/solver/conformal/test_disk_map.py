@@ -6,6 +6,7 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 from omt_uv.solver import errors
+from omt_uv.solver.conformal import disk_map
 from omt_uv.solver.conformal.disk_map import (
     boundary_turns,
     conformal_disk,
@@ -271,3 +272,12 @@ def test_a_square_of_two_triangles_has_its_own_corners():
     for corners in ([0, 2, 1, 3], [0, 1, 2, 2], [3, 2, 1, 0]):
         with pytest.raises(ValueError, match="counter-clockwise"):
             drain(conformal_rectangle(V, F, np.array(corners)))
+
+
+@pytest.mark.parametrize("folds", [(0,), (3, 0), (5, 2), (4, 4)])
+def test_faces_are_called_straightened_that_were_folded_and_are_no_longer(monkeypatch, folds):
+    counts, moved = iter(folds + folds[:1]), []
+    monkeypatch.setattr(disk_map, "count_folds", lambda *of: next(counts))
+    monkeypatch.setattr(disk_map, "untangle", lambda uv, *of: (moved.append(1) or uv, None))
+    found = drain(disk_map.conformal_disk(*meshes.bumpy(4, 4)))
+    assert found.straightened == folds[0] - folds[-1] and len(moved) == (folds[0] > 0)

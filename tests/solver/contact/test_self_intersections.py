@@ -58,3 +58,18 @@ def test_two_balls_and_one():
     large = np.concatenate([two, [[0, 0, 0.01], [90, 0, 0.01], [0, 90, 0.02]]])
     many = intersecting_pairs(large, np.concatenate([faces, [[len(two), len(two) + 1, len(two) + 2]]]))
     assert (many == len(faces)).any()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_pairs_are_the_same_however_vertices_and_triangles_are_numbered(seed):
+    """Of soups, where edges have one triangle or many, and triangles meet at single vertices, on either side."""
+    rng = np.random.default_rng(seed)
+    V = rng.uniform(size=(9, 3)) * ([1, 1, 0.2] if seed % 2 else [1, 1, 1])
+    F = np.array([rng.choice(9, 3, replace=False) for _ in range(14)])
+    F = F[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]]
+    found = {frozenset(pair) for pair in intersecting_pairs(V, F).tolist()}
+    assert found
+    for _ in range(6):
+        order, rows = rng.permutation(9), rng.permutation(len(F))
+        again = intersecting_pairs(V[order], np.argsort(order)[F[rows]])
+        assert {frozenset(rows[pair].tolist()) for pair in again} == found

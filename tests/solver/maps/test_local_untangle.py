@@ -96,3 +96,18 @@ def test_steps_to_an_area_are_the_least_that_lead_there():
         np.testing.assert_allclose(found[k].ravel(), missing[k] * gradient / (gradient @ gradient), rtol=1e-10)
     # A face without an outline has no direction, and is no division by zero.
     assert not local_untangle._area_steps(np.zeros((1, 3, 2)), np.ones(1), np.ones(1)).any()
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-9, 2e-8])
+def test_corners_whose_vertex_did_not_move_keep_every_bit_also_where_they_are_a_little_apart(apart):
+    """Corners of a vertex are joined to look for folds, and not otherwise."""
+    uv, F = flat()
+    wrong = uv.copy()
+    middle = np.argsort(np.linalg.norm(uv - uv.mean(axis=0), axis=1))[0]
+    wrong[middle] += 2.2 * (uv[F[0]].max(axis=0) - uv[F[0]].min(axis=0))
+    values = corners(wrong, F)
+    values = values + apart * np.random.default_rng(0).uniform(-0.5, 0.5, values.shape)
+    new, left = straighten_folds(F, values, np.ones(len(F)))
+    moved = np.abs(new - values).max(axis=1) > 1e-6
+    assert left == 0 and moved.any() and not moved.all()
+    assert new[~moved].tobytes() == values[~moved].tobytes()

@@ -217,3 +217,21 @@ def test_a_body_with_legs_has_shorter_seams_and_keeps_the_bound(monkeypatch):
     assert max(one.angle_mean for one in joined.maps) <= 1.35 and not joined.warnings
     assert not sum(one.folds for one in joined.maps)
     assert sorted(np.concatenate([one.faces for one in joined.charts]).tolist()) == list(range(len(F)))
+
+
+@pytest.mark.parametrize("what", ["an error", "as it is", "mapped"])
+def test_only_joints_that_were_mapped_use_up_the_vertices_that_may_be(monkeypatch, what):
+    """No more are mapped than all charts have; what was not mapped leaves room for all others."""
+    monkeypatch.setattr(rejoining, "MOST_MAPPED", 0)
+    search = square(8)
+    last, asked = round_of(search, np.concatenate([column(8, k) for k in (2, 4, 6)])), []
+
+    def cut(round_, kept, most):
+        asked.append(len(kept))
+        if what == "an error":
+            raise FoldedUVError("It folds", "Do not", "face", np.zeros(1, int))
+        return worked(last if what == "as it is" else round_of(search, kept, 1.31))
+
+    assert drain(rejoining.rejoined(search, round_of(search, last.cuts.edges[:0]), last, cut)) is last
+    # Two of four strips have half of all vertices.
+    assert len(asked) == (2 if what == "mapped" else 3)

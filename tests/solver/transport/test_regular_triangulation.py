@@ -62,3 +62,20 @@ def test_new_names_for_the_sites():
 def test_sites_on_a_line_have_no_triangulation():
     with pytest.raises(TransportError, match="The sites of the transport lie on one line or"):
         by_hull(np.column_stack([np.arange(5.0), np.zeros(5)]), np.zeros(5))
+
+
+@pytest.mark.parametrize("count", [6, 9, 14])
+def test_a_site_is_called_hidden_only_where_the_hull_has_it_in_no_triangle(count):
+    """And what flips reach is the hull's: of weights of all sizes, where sites on the border have three neighbours."""
+    reached = told = 0
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        sites = rng.uniform(-1, 1, (count, 2))
+        start, weights = by_hull(sites, np.zeros(count)), 10 ** rng.uniform(-3, 0.5) * rng.normal(size=count)
+        found, hidden = by_flips(start, sites, weights)
+        wished = by_hull(sites, weights)
+        if found is not None:
+            assert sets(found) == sets(wished) and not hidden
+        assert not hidden or len(np.unique(wished.triangles)) < count
+        reached, told = reached + (found is not None), told + hidden
+    assert reached > 10 and told > 10
