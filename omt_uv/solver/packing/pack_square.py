@@ -40,9 +40,11 @@ FIRST_SHARE = 0.75
 SMALLER = 0.95
 HASTE = 0.99
 # An order has room at larger scales by this factor, by its root where it has not, and so on, down to the other. By that
-# one scales are larger that other orders are tried at.
+# one scales are larger that other orders are tried at; what these have room for is tried at first by the third, and by
+# its square while it has.
 LARGER = 1.04
 EXACT = 1.004
+LITTLE_LARGER = 1.006
 # A scale this much below the first one that was tried is none: the margins fill the square.
 LEAST_SCALE = 1e-3
 # Orders that are tried at a scale, at least, and of few items as many as take about so many places: what found no room
@@ -270,12 +272,14 @@ def _larger(found: _Found, most: float) -> Steps[_Found]:
     task, order, limit, best, others = found.task, found.order, most * found.scale, found, 0
     orders = max(ORDERS, PLACES_TRIED // len(order))
     while EXACT * best.scale <= limit:
-        step = LARGER
+        # What has no room for one order by much, has seldom for another: small steps first, that grow.
+        step = min(LARGER if not others else LITTLE_LARGER, limit / best.scale)
         while step > EXACT:
             yield Progress("Packing", others / (others + 1))
-            new, order = _fit(task, min(step * best.scale, limit), order, 1)
-            best, order, step = (best, order, np.sqrt(step)) if new is None else (new, new.order, step)
-            step = min(step, limit / best.scale)
+            new, order = _fit(task, step * best.scale, order, 1)
+            best, order = (best, order) if new is None else (new, new.order)
+            step = np.sqrt(step) if new is None else step**2 if others else step
+            step = min(step, LARGER, limit / best.scale)
         yield Progress("Packing", others / (others + 1))
         scale = EXACT * best.scale
         new, order = (None, order) if scale > limit else _fit(task, scale, order, orders)
