@@ -10,6 +10,7 @@ import bpy
 
 import numpy as np
 
+from benchmarks.parts.clicks import uv_of
 from benchmarks.rivals import METHODS
 from benchmarks.timing import timed
 from omt_uv.blender.mesh import read
@@ -49,9 +50,7 @@ def ours(obj, axes=None, **settings) -> DrawnMap:
     job = UnwrapJob(reading.surface, reading.faces, axes=axes or reading.axes)
     chosen = Settings(**{"max_shear": DEFAULT_MAX_SHEAR} | settings)
     layout, seconds = timed(lambda: drain(lay_out([job], chosen)))
-    uv = np.zeros((len(reading.surface.corner_vertex), 2))
-    uv[layout.corners[0]] = layout.uv[0]
-    return mapped(replace(reading, uv=uv), seconds)
+    return mapped(replace(reading, uv=uv_of(reading.surface, layout)), seconds)
 
 
 def blender_unwrap(obj, seams, method) -> DrawnMap:

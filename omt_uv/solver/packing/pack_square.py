@@ -277,8 +277,10 @@ def _larger(found: _Found, most: float) -> Steps[_Found]:
         while step > EXACT:
             yield Progress("Packing", others / (others + 1))
             new, order = _fit(task, step * best.scale, order, 1)
-            best, order = (best, order) if new is None else (new, new.order)
-            step = np.sqrt(step) if new is None else step**2 if others else step
+            if new is None:
+                step = np.sqrt(step)
+            else:
+                best, order, step = new, new.order, step**2 if others else step
             step = min(step, LARGER, limit / best.scale)
         yield Progress("Packing", others / (others + 1))
         scale = EXACT * best.scale
