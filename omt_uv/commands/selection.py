@@ -72,7 +72,8 @@ def read_file(options: argparse.Namespace, layer: str = "") -> list:
         if reading.faces.any():
             pairs.append((obj, reading))
         elif len(unique) > 1:
-            warn_of(f"{obj.name} has no faces and is left alone")
+            options.told.append(f"{obj.name} has no faces and is left alone")
+            warn_of(options.told[-1])
     if not pairs:
         raise CommandError(f"{path}: The mesh has no faces. Give a file with faces.")
     return pairs

@@ -61,6 +61,21 @@ def test_every_warning_is_told_once_and_reported(package, run, folder):
     assert len(tried) >= 7, tried
 
 
+@pytest.mark.parametrize("name", ["unwrap", "flow", "partition"])
+def test_a_mesh_without_faces_is_told_and_reported(run, folder, name):
+    """It is left alone beside another one."""
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "in.blend"))
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("bare", bpy.data.meshes.new("bare")))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "with_bare.blend"))
+    for file in ("report.json", "out.blend"):
+        (folder / file).unlink(missing_ok=True)
+    status, _, err = run(*command_runs.words(name, folder, "with_bare.blend"))
+    assert status == 0, err
+    told = [line.removeprefix(MARK) for line in err.splitlines() if line.startswith(MARK)]
+    assert sorted(told) == sorted(json.loads((folder / "report.json").read_text())["warnings"])
+    assert told.count("bare has no faces and is left alone") == 1
+
+
 def test_a_warning_of_the_solver_is_told_once_for_each_object_in_order(package, capsys):
     class Named:
         def __init__(self, name):

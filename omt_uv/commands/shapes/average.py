@@ -12,7 +12,7 @@ from typing import Any
 from ... import __version__
 from ...batch.plan import READABLE
 from ...pipelines.shapes.choices import DEFAULT_PREFIX
-from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn_of
+from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn, warn_of
 from ..options import add_input, number
 from ..selection import of_file, read_file
 
@@ -110,8 +110,7 @@ def _registered(options: argparse.Namespace, files: list[Path]):
             job = MatchJob(first, surface, pairs, RegistrationOptions(), first.seams[:0])
             found = drain_shown(wrap_surfaces(job))
         shapes.append(Registered(path, obj.name, found.wrapped, True))
-        for text in found.warnings:
-            warn_of(f"{obj.name}: {text}")
+        options.told += warn([obj], [(0, text) for text in found.warnings], [])
     return shapes, first, polygons
 
 

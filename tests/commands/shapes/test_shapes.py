@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import bpy
 
@@ -95,6 +96,7 @@ def test_the_mean_of_a_folder(run, tmp_path):
     score = np.zeros(len(V), np.float32)
     bpy.data.objects["scan2"].data.attributes["OMT Z-Score"].data.foreach_get("value", score)
     assert score.argmax() == 5 and "OMT Deviation" in bpy.data.objects["Mean"].data.attributes
+    mean = positions(bpy.data.objects["Mean"])
     # What is told of a file is what is written of it, and all stand side by side.
     for k, row in enumerate(rows):
         obj = bpy.data.objects[f"scan{k}"]
@@ -103,11 +105,31 @@ def test_the_mean_of_a_folder(run, tmp_path):
         )
         told = [row[name] for name in ("greatest_score", "vertices_beyond", "greatest", "rms")]
         assert told == pytest.approx([score.max(), (score > 1.2).sum(), far.max(), np.sqrt((far**2).mean())], rel=1e-5)
+        assert np.linalg.norm(positions(obj) - mean, axis=1) == pytest.approx(far, abs=1e-6)
         assert 0 < row["vertices_beyond"] < len(V) and f"{row['vertices_beyond']} vertices beyond 1.2" in text
         assert obj.location.x == pytest.approx((k + 1) * bpy.data.objects["scan0"].location.x)
     assert bpy.data.objects["scan0"].location.x >= np.ptp([v.co.x for v in bpy.data.objects["Mean"].data.vertices])
     status, _, err = run("average", tmp_path / "none", "-o", out)
     assert status == 1 and "no such folder" in err
+
+
+def test_what_is_told_of_a_shape_that_had_to_be_matched_is_reported_with_its_name(run, files, package, monkeypatch):
+    """The second of the files has other vertices, and what is found of it comes with two warnings."""
+    folder, *_ = files
+    remedy = package("solver.errors").MERGE
+
+    def wrapped(job):
+        yield package("solver.progress").Progress("Match", 0.0)
+        return SimpleNamespace(wrapped=job.source.positions, warnings=("a hint", f"more: {remedy}"))
+
+    monkeypatch.setattr(package("pipelines.shapes.wrap"), "wrap_surfaces", wrapped)
+    out, report = folder / "out" / "mean.blend", folder / "out" / "r.json"
+    out.parent.mkdir()
+    status, _, err = run("average", folder, "-o", out, "--report", report)
+    assert status == 0, err
+    told = [line.removeprefix("omt_uv: warning: ") for line in err.splitlines() if "warning: " in line]
+    assert told == json.loads(report.read_text())["warnings"]
+    assert told == ["Target: a hint", f"Target: {package('remedies').advise(f'more: {remedy}')}"]
 
 
 def test_strain_by_region(run, files):
