@@ -141,13 +141,13 @@ class Manifest:
             if row is not None and fresh and _is_over(row, retry):
                 continue
             due.append(task)
-            waiting.append((task.name, str(task.path), task.size, WAITING, 0 if row is None else row["tries"]))
+            waiting.append((task.name, str(task.path), task.size, WAITING))
         # All or nothing, also of what is stopped by hand, or by a full disk.
         with _named(self.path), self._base:
             self._base.execute("BEGIN IMMEDIATE")
             self._base.executemany("DELETE FROM runs WHERE name = ?", [(name,) for name in rows])
             self._base.executemany(
-                "INSERT INTO runs (name, path, size, state, tries) VALUES (?, ?, ?, ?, ?) ON CONFLICT (name) "
+                "INSERT INTO runs (name, path, size, state) VALUES (?, ?, ?, ?) ON CONFLICT (name) "
                 "DO UPDATE SET path = excluded.path, size = excluded.size, state = excluded.state",
                 waiting,
             )

@@ -17,9 +17,6 @@ from ..distortion import ChosenTriangles, triangles_of
 from ..reading import Reading
 from ..subdivision import evaluated_polygons
 
-# Shear of a face counts up to here: one that is squashed onto a line must not drown the mean of all others.
-MOST_SHEAR = 1e6
-
 
 @dataclass(frozen=True)
 class RegionFigures:
@@ -78,7 +75,7 @@ def figures_by_region(
         area=polygon_areas(found.positions, found.triangles, found.polygons),
         uv_area=np.abs(signed_areas(flat, np.arange(len(flat)).reshape(-1, 3))),
         ratio=2.0**octaves,
-        shear=np.minimum(shear, MOST_SHEAR),
+        shear=shear,
     )
     rows = [_row("all", measured, np.ones(len(found.triangles), bool), texture_size)]
     for name, masks in regions:

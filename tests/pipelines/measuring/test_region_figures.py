@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from omt_uv.pipelines.measuring.per_face import face_values
 from omt_uv.pipelines.measuring.region_figures import diameter, figures_by_region, perimeter, table_text
 from omt_uv.pipelines.reading import Reading
 from omt_uv.solver.errors import EmptyMeshError
+from omt_uv.solver.maps.distortion import SHEAR_CAP
 from omt_uv.solver.mesh.surface import Surface
 
 
@@ -45,6 +47,17 @@ def test_regions_have_the_figures_of_hand(squares):
     assert left.uv_diameter == pytest.approx(0.05**0.5, rel=1e-6)
     assert left.texel_density == pytest.approx(100, rel=1e-5)
     assert both.ratio_sd == pytest.approx(0, abs=1e-5) and both.shear == pytest.approx(2.5, rel=1e-5)
+
+
+@pytest.mark.parametrize("thin", [0.0, 1e-12, 1e-9])
+def test_a_face_that_is_squashed_onto_a_line_does_not_drown_the_shear_of_others(squares, thin):
+    """It counts as the most that any face counts, and leaves the figures of other regions as they are."""
+    uv = squares.uv.astype(float)
+    uv[4:, 1] = 0.5 + thin * np.array([0, 0, 1, 1])
+    left, right = np.array([True, False]), np.array([False, True])
+    every, first, second = figures_by_region([replace(squares, uv=uv)], [("l", [left]), ("r", [right])], 1000)
+    assert second.shear == pytest.approx(SHEAR_CAP) and first.shear == pytest.approx(1, rel=1e-5)
+    assert every.shear == pytest.approx((SHEAR_CAP + 1) / 2)
 
 
 def test_several_readings_are_counted_as_one(squares):
