@@ -140,3 +140,24 @@ def test_rows_of_a_match_are_those_of_its_result(package, met, meeting):
     assert rows["Landmarks met"] == (f"{sum(met)} of {len(met)}" if met else "none set")
     assert (rows["Flipped"], rows["Distance, rms"], rows["Area ratio, mean"]) == ("1.2 %", "4.6 %", "1.23")
     assert rows.get("Faces that meet") == (None if meeting is None else str(meeting))
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "right"),
+    [
+        ("uv.omt_unwrap", {"keep_free": "nothing"}, {"max_shear": 0.0}),
+        ("uv.omt_magnify", {"weight_group": "nothing"}, {"weight_group": "region", "factor": 1.5}),
+        ("mesh.omt_partition", {"capacity_group": "nothing"}, {"cells": 3, "relax": 0}),
+        ("object.omt_remesh", {"density": "WEIGHTS", "weight_group": "nothing"}, {"target_vertices": 40}),
+    ],
+)
+def test_what_was_wrong_before_a_run_that_ends_well_is_no_longer_told(package, uvs, told, name, wrong, right):
+    found, state = operator_runs.bodies(uvs), package("session.last_run").state
+    scenes.select([found["A"].obj])
+    with pytest.raises(RuntimeError, match="nothing"):
+        told(name, **wrong)
+    assert "nothing" in state.error and state.summary.refused
+    told(name, **right)
+    assert state.error == "" and not state.summary.refused
+    report = package("operators.report").report_text(bpy.context)
+    assert "last error: none" in report and "nothing" not in report

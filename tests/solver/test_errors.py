@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omt_uv.solver.errors import DensityError, MeshError, positive_density
+from omt_uv.solver.errors import FEW, DensityError, MeshError, first_of, positive_density
 
 
 @pytest.mark.parametrize(
@@ -20,6 +20,16 @@ def test_messages(kind, elements, text):
     error = MeshError("It is so", kind=kind, elements=list(elements))
     assert str(error) == text and error.kind == kind
     np.testing.assert_array_equal(error.elements, list(elements))
+
+
+@pytest.mark.parametrize("count", [*range(FEW + 3), 40])
+@pytest.mark.parametrize("of_edges", [False, True])
+def test_dots_stand_for_elements_that_are_not_named_and_for_no_others(count, of_edges):
+    elements = np.arange(2 * count).reshape(-1, 2) if of_edges else np.arange(count)
+    named = [str(x) for x in elements.tolist()]
+    text = first_of(elements)
+    assert text == ", ".join(named[:FEW]) + ", ..." * (count > FEW)
+    assert all(name in text for name in named) == (count <= FEW)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])

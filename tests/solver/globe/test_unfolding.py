@@ -164,6 +164,23 @@ def test_quads_across_the_seam_go_on_past_one(turn):
     assert signed_areas(uv, polygons.triangles).sum() == pytest.approx(1 - 1 / 12, abs=1e-9)
 
 
+@pytest.mark.parametrize("projection", PROJECTIONS)
+@pytest.mark.parametrize("turn", [1e-12, -1e-12, 1e-8, -1e-8])
+def test_rounding_of_what_lies_on_the_seam_moves_no_face(projection, turn):
+    """Whichever side of it the vertices of a column are by their last digits, faces lie in the same square."""
+    found = []
+    for angle in (0.0, turn):
+        points, faces = uv_sphere(turn=angle)
+        corner_vertex = np.concatenate(faces)
+        starts = np.append(0, np.cumsum([len(f) for f in faces]))
+        polygon = np.repeat(np.arange(len(faces)), np.diff(starts))
+        fans = [
+            [starts[k], starts[k] + j, starts[k] + j + 1] for k, f in enumerate(faces) for j in range(1, len(f) - 1)
+        ]
+        found.append(unfold(points, Polygons(corner_vertex, polygon, np.array(fans)), projection)[0].corners())
+    np.testing.assert_allclose(found[1], found[0], atol=1e-6)
+
+
 def test_a_pole_inside_a_face_is_counted_and_laid_out_flat():
     P, F = icosphere(0)
     # Three faces meet nowhere near: the poles' faces are as wide as the limit of a push allows.

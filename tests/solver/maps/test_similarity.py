@@ -45,8 +45,9 @@ def test_a_centre_goes_where_it_is_told():
 
 
 @pytest.mark.parametrize("quarters", range(4))
-def test_turns_are_rounded_to_quarters(quarters):
-    found = fit_similarity(POINTS, 3 * np.exp(1j * (np.pi / 2 * quarters + 0.4)) * POINTS).in_quarter_turns()
+@pytest.mark.parametrize("off", [0.0, 0.4, -0.4, 0.78, -0.78])
+def test_turns_are_rounded_to_the_nearest_quarter(quarters, off):
+    found = fit_similarity(POINTS, 3 * np.exp(1j * (np.pi / 2 * quarters + off)) * POINTS).in_quarter_turns()
     assert found.factor == pytest.approx(3 * 1j**quarters, abs=1e-12)
 
 

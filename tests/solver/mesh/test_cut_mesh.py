@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.cut_mesh import are_across_seams, cut_open, descend, on_seam, seam_points
+from omt_uv.solver.mesh.cut_mesh import DETOUR, are_across_seams, cut_open, descend, on_seam, seam_points
 from omt_uv.solver.mesh.topology import boundary_loops
 
 
@@ -71,3 +71,31 @@ def test_walks_do_not_cross_seams():
     limit, slack = np.array([10.0]), np.array([0.0])
     assert are_across_seams(mesh, start, free, limit, slack)[0]
     assert not are_across_seams(mesh, start, end, limit, slack)[0]
+
+
+@pytest.mark.parametrize("slack", [0.0, 0.05, 0.2, 0.6])
+def test_a_seam_lies_between_where_the_way_around_it_is_longer_than_both_allow(slack):
+    """Ways from face to face along the middles of faces, with and without a seam, vertex by vertex of that graph."""
+    V, F, seams = strip()
+    mesh = cut_open(V, F, seams)
+    middle, edges, cut = V[F].mean(axis=1), {}, {frozenset(pair) for pair in seams.tolist()}
+    for f, corners in enumerate(F.tolist()):
+        for k in range(3):
+            edges.setdefault(frozenset((corners[k], corners[k - 1])), []).append(f)
+    free, every = np.full((2, len(F), len(F)), np.inf)
+    for edge, faces in edges.items():
+        if len(faces) == 2:
+            length = np.linalg.norm(np.subtract(*middle[faces]))
+            for table in (every,) if edge in cut else (every, free):
+                table[faces[0], faces[1]] = table[faces[1], faces[0]] = length
+    for table in (free, every):
+        np.fill_diagonal(table, 0)
+        for k in range(len(F)):
+            np.minimum(table, table[:, [k]] + table[k], out=table)
+    start, end = (x.ravel() for x in np.mgrid[0 : len(F) : 7, 0 : len(F) : 5])
+    longer = free[start, end] > DETOUR * every[start, end] + slack
+    found = are_across_seams(mesh, start, end, np.full(len(start), 50.0), np.full(len(start), slack))
+    # Ways that are just as long are left to rounding.
+    clear = np.abs(free[start, end] - DETOUR * every[start, end] - slack) > 1e-9
+    np.testing.assert_array_equal(found[clear], longer[clear])
+    assert longer.any() and not longer.all()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,27 @@ def test_rows_sum_to_one_and_quads_lie_polygon_by_polygon(levels, limit):
     found = subdivide(cube(), levels, limit)
     assert np.allclose(np.asarray(found.matrix.sum(axis=1)), 1)
     assert (found.polygon == np.repeat(np.arange(6), 4**levels)).all()
+
+
+@pytest.mark.parametrize("pages", [1, 2, 3, 5])
+@pytest.mark.parametrize("limit", [False, True])
+def test_a_straight_boundary_stays_where_other_than_two_polygons_meet(pages, limit):
+    """Pages of two quads each, one behind the other, bound along an edge: within a book of two nothing is kept."""
+    turn = 2 * np.pi * np.arange(pages) / max(pages, 1)
+    spine = np.array([[0, 0, 0], [0.3, 0.4, 1.2], [0, 0, 2]])
+    rest = [[r * np.cos(t), r * np.sin(t), z] for t in turn for r in (1, 2) for z in (0.0, 1, 2)]
+    V = np.concatenate([spine, rest])
+    quads = []
+    for k in range(pages):
+        rows = [[0, 1, 2], *([3 + 6 * k + 3 * r + z for z in range(3)] for r in range(2))]
+        quads += [[a[z], b[z], b[z + 1], a[z + 1]] for a, b in pairwise(rows) for z in range(2)]
+    sides = [frozenset((q[i], q[i - 1])) for q in quads for i in range(4)]
+    stays = sorted({v for side in sides if sides.count(side) != 2 for v in side})
+    cage = cage_of(np.array(quads).ravel(), np.arange(0, 4 * len(quads) + 1, 4), len(V))
+    moved = np.linalg.norm((subdivide(straight_boundary(cage), 2, limit).matrix @ V)[: len(V)] - V, axis=1)
+    np.testing.assert_allclose(moved[stays], 0, atol=1e-12)
+    assert (1 in stays) == (pages != 2)
+    assert {tuple(sorted(s)) for s in sides if sides.count(s) != 2} >= ({(0, 1), (1, 2)} if pages != 2 else set())
 
 
 def test_points_of_a_cube_after_a_level():

@@ -53,6 +53,26 @@ def test_samples_lie_on_their_arcs_at_equal_distances(case):
     np.testing.assert_array_equal(used, np.arange(len(samples.points)))
 
 
+@pytest.mark.parametrize("apart", [1.0, 1.7, 4.0])
+@pytest.mark.parametrize("case", range(3))
+def test_lines_that_are_kept_are_sampled_farther_apart_and_cuts_are_not(case, apart):
+    maps, network = list(networks())[case]
+    V = maps.component.vertices
+    plain = sample_arcs(V, network.arcs, np.full(len(V), 0.1))
+    found = sample_arcs(V, network.arcs, np.full(len(V), 0.1), line_spacing=apart)
+    assert {arc.kept for arc in network.arcs} == ({False} if case == 0 else {True} if case == 2 else {False, True})
+    for k, arc in enumerate(network.arcs):
+        before, after = len(plain.along[k]) - 1, len(found.along[k]) - 1
+        length = np.linalg.norm(np.diff(V[arc.vertices], axis=0), axis=1).sum() / 0.1
+        assert after == before if not arc.kept else after == max(round(length / apart), 3 * _returns(arc), 1)
+        np.testing.assert_array_equal(found.fixed[found.along[k][1:-1]], arc.kept)
+
+
+def _returns(arc):
+    """Whether an arc ends where it begins."""
+    return bool(arc.vertices[0] == arc.vertices[-1])
+
+
 def test_a_square_has_its_corners():
     maps, network = list(networks())[2]
     V = maps.component.vertices
