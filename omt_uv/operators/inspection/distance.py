@@ -46,11 +46,13 @@ class OBJECT_OT_omt_distance(QuickOperator, bpy.types.Operator):
             write_distances(obj, distance)
         vertices = np.zeros(len(obj.data.loops), np.int32)
         obj.data.loops.foreach_get("vertex_index", vertices)
-        share = distance[vertices] / max(float(distance.max()), 1e-300)
+        # Vertices of no face show no colour, and may be anywhere.
+        greatest = float(distance[vertices].max())
+        share = distance[vertices] / max(greatest, 1e-300)
         write_colours(obj, np.arange(len(vertices)), shear_colours(SHEAR_TOP**share))
         overlay.show_written(context)
         self.report(
             {"INFO"},
             f"Hausdorff {100 * figures.hausdorff:.3f} %, rms {100 * figures.rms:.4f} % of the diagonal of "
-            f"{others[0][0].name}; yellow is {float(distance.max()):.4g} away; {NAME!r} has the distances",
+            f"{others[0][0].name}; yellow is {greatest:.4g} away; {NAME!r} has the distances",
         )
