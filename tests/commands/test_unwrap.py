@@ -7,6 +7,7 @@ import json
 import bpy
 
 import numpy as np
+import pytest
 import scenes
 
 
@@ -52,6 +53,19 @@ def test_subdivision(run, tmp_path):
     assert errors["auto"] == errors["1"] < errors["off"] and errors["2"] < errors["off"]
     assert "on the subdivided surface" in run("measure", tmp_path / "auto.blend")[1].lower()
     assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "o.blend", "--subdivision", "-1")[0] != 0
+
+
+@pytest.mark.parametrize("choice", ["auto", "1", "off"])
+def test_modifiers_below_are_told_where_the_surface_that_they_are_of_is_asked_for(run, tmp_path, choice):
+    obj = scenes.bump(5, 6)
+    obj.modifiers.new("Round", "BEVEL")
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    words = ["--quality", "draft", "--subdivision", choice]
+    status, _, err = run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "o.blend", *words)
+    assert status == 0, err
+    assert err.count("Areas are those before the modifiers") == (choice != "off"), err
 
 
 def test_maps_by_name_rectangles_and_markers(run, tmp_path):

@@ -1,6 +1,7 @@
 """What a mesh carries, and the edges at which it jumps."""
 
 import itertools
+from dataclasses import replace
 
 import meshes
 import numpy as np
@@ -43,6 +44,15 @@ def test_marks_are_sharp_by_any_of_three_names():
     marks = Marks(edges, np.ones(4, bool), np.array([1, 0, 0, 0], bool), np.array([0, 0.3, 0, 0]), (bevel, other))
     attributes = carried(np.zeros((1, 3)), marks)
     assert np.array_equal(marked_sharp(attributes), edges[:3])
+
+
+def test_what_was_left_before_is_still_named_once_marks_are_left_too():
+    edges, none = np.array([[0, 1], [2, 1]]), np.zeros(2, bool)
+    far = Layer("far", "EDGE", "INT", np.array([0, 1]))
+    given = replace(carried(np.zeros((1, 3)), Marks(edges, none, none, none, (far,))), left=("words", "more words"))
+    for lines, named in (([[1, 0]], ("words", "more words", "far")), ([[1, 0], [1, 2]], ("words", "more words"))):
+        once = followed(given, np.array(lines))
+        assert once.left == named and followed(once, np.array(lines)).left == named
 
 
 def test_marks_away_from_the_lines_are_left_and_named():

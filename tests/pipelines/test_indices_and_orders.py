@@ -61,6 +61,14 @@ def test_words_of_a_batch_end_at_the_first_dashes():
         assert options.rest == rest and options.command == "unwrap"
 
 
+@pytest.mark.parametrize("command", ["unwrap", "refine", "seams", "measure", "stack", "remesh"])
+def test_what_stands_behind_dashes_is_a_file_of_every_other_command(command):
+    """Also one whose name begins with a dash."""
+    words = {"measure": [], "remesh": ["-o", "out.obj", "--vertices", "50"]}.get(command, ["-o", "out.obj"])
+    options = parsed([command, *words, "--", "-in.obj"])
+    assert str(options.input) == "-in.obj" and options.rest == []
+
+
 def signature(seed):
     points = np.random.default_rng(seed).normal(size=(20, 3))
     return Signature(points / np.linalg.norm(points, axis=1, keepdims=True), np.full(20, 0.5), 0.1 * seed)

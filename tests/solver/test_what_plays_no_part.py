@@ -17,7 +17,7 @@ from solver_runs import curved, near_middle
 from told_otherwise import body, patch, ramp
 
 from omt_uv import solver as omt
-from omt_uv.solver import comparison, partition, subdivision
+from omt_uv.solver import comparison, partition, subdivision, transfer
 from omt_uv.solver.analysis import curvature, density, occlusion, saliency, seam_costs, symmetry_plane, vertex_scores
 from omt_uv.solver.analysis.joint_density import joint_density
 from omt_uv.solver.editing.refine_island import refine_island
@@ -94,6 +94,13 @@ def _reported(V, F):
     return found.vertices, found.triangles, found.faces, found.barycentric
 
 
+def _carried(V, F):
+    """Where a new mesh is on the old one, which is cut along a line of its edges."""
+    new = drain(remesh(RemeshSource(V[: F.max() + 1], F), 80, RemeshOptions(rounds=4)))
+    seams = np.array([[3 + 8 * k, 11 + 8 * k] for k in range(7)])
+    return transfer.correspond(V, F, seams, new.vertices, new.triangles, new.faces, new.barycentric)
+
+
 # Functions, and the meshes that they are asked about.
 OF_MESHES = {
     "mirror planes": (_mirror, "mirrored", "nearly mirrored", "mirrored body"),
@@ -115,6 +122,7 @@ OF_MESHES = {
     "refined UVs": (lambda V, F: omt.refine(V, F, V[F][:, :, :2], quality="draft").uv, "patch", "mirrored"),
     "magnified regions": (_magnified, "patch", "quads"),
     "new meshes": (_reported, "patch", "body"),
+    "what a new mesh takes over": (_carried, "patch"),
     "subdivided corners": (_subdivided, "patch", "quads"),
     "scores": (
         lambda V, F: [vertex_scores.vertex_score(k, V, F, np.arange(len(V)) < 4) for k in vertex_scores.KINDS],

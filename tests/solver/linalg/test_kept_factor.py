@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from work import counted_work
 
 from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.linalg import kept_factor
 from omt_uv.solver.linalg.additive_schwarz import FEW, MOST_KEPT, RENEWED, AdditiveSchwarz
 from omt_uv.solver.linalg.kept_factor import KEPT_ENOUGH, WINDOW, KeptFactor, by_gradients
 
@@ -48,6 +49,23 @@ def test_systems_like_the_one_before_need_no_new_factors(systems):
     exact = KeptFactor().solve(like, b, b, lambda: b)
     assert (1 - KEPT_ENOUGH) * fall(like, b, exact) <= fall(like, b, x) <= (1 + 1e-9) * fall(like, b, exact)
     assert b @ x > 0
+
+
+def test_the_last_solution_is_where_the_next_search_looks_first(systems, monkeypatch):
+    """Whether that came by new factors or by kept ones."""
+    _, _, first, like, _, b = systems
+    looked = []
+
+    def found(matrix, b, precondition, most, enough, guess):
+        looked.append(guess)
+        return by_gradients(matrix, b, precondition, most, enough, guess)
+
+    monkeypatch.setattr(kept_factor, "by_gradients", found)
+    solver = KeptFactor()
+    answers = [solver.solve(matrix, b, b, lambda: b).copy() for matrix in (first, like, 1.01 * like, like)]
+    assert len(looked) == 3
+    for guess, answer in zip(looked, answers, strict=False):
+        np.testing.assert_array_equal(guess, answer)
 
 
 def test_others_are_factored_anew_and_serve_from_then_on(systems):

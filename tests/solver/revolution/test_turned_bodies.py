@@ -50,6 +50,16 @@ def test_a_turned_body_has_its_axis_wherever_it_is(name, turn):
     np.testing.assert_allclose(np.linalg.norm(axis.plane(V), axis=1), axis.radius(V), atol=1e-9)
 
 
+@pytest.mark.parametrize("longer", [0.3, 1e-3, 0.01, 0.02])
+@pytest.mark.parametrize("way", [1, -1])
+def test_what_is_nearly_a_ball_turns_about_no_axis_of_its_own(longer, way):
+    """However exactly it turns about the one along which it is a little longer, or shorter."""
+    V, F = bodies.icosphere(3)
+    found = axis_of_revolution(V * [1, 1, 1 + way * longer], F, np.arange(len(F)))
+    assert (found is not None) == (longer > 0.1)
+    assert found is None or abs(found.direction[2]) == pytest.approx(1, abs=1e-3)
+
+
 def test_what_does_not_turn_or_turns_about_any_axis_has_none():
     V, F = bodies.icosphere(2)
     every = np.arange(len(F))

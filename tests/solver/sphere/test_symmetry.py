@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import meshes
 import numpy as np
+import pytest
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 from sphere_shapes import random_rotation
@@ -25,6 +26,16 @@ def test_the_nearest_symmetric_map_in_two_mirrors():
     assert len(symmetry.images) == 3 and np.abs(found - turned).max() < 0.05
     assert np.abs(symmetry.averaged(found) - found).max() < 1e-12
     assert symmetric_map(images[:1], V[np.random.default_rng(0).permutation(len(V))]) is None
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_a_map_is_of_no_symmetric_surface_where_a_single_vertex_is_far_from_its_image(count):
+    V, _ = meshes.icosphere(3)
+    image = cKDTree(V).query(V * [1, 1, -1])[1]
+    moved = V.copy()
+    moved[np.flatnonzero(V[:, 2] > 0.5)[:count]] *= [-1, -1, 1]
+    found = symmetric_map(image[None], moved)
+    assert (found is None) == (count > 0)
 
 
 def test_hessians_in_the_mean_with_their_images_say_the_same_of_symmetric_motions():
