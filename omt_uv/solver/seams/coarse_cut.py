@@ -13,11 +13,11 @@ from scipy.spatial import cKDTree
 
 from ..cutting.component import CutComponent
 from ..linalg.sparse import solve_spd
-from .coarse_surface import CoarseSurface
+from .coarse_surface import CoarseSurface, Mirrored
 from .cut_tree import EXCHANGE, Cut, Task
 from .fine_paths import FineMirror, carried
 from .growth import EVEN
-from .path_graph import Mirrored, PathGraph, path_graph
+from .path_graph import PathGraph, path_graph
 from .predicted_scale import ScaleModel
 
 # A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
@@ -104,8 +104,8 @@ class Setting:
     @staticmethod
     def of(component: CutComponent, coarse: CoarseSurface, base, mirror, model, tip_factor) -> Setting:
         tree = cKDTree(coarse.positions)
-        mirrored = None
-        if mirror is not None:
+        mirrored = coarse.mirrored
+        if mirror is not None and mirrored is None:
             plane, side = mirror.plane[coarse.kept], mirror.side[coarse.kept]
             image = np.arange(len(plane))
             # Images are on the other side, or a cut would meet them where nothing but they are cut.

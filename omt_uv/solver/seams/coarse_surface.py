@@ -10,8 +10,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import angle_defects, angles_from_lengths, cross3, halfedge_lengths, vertex_areas
-from ..mesh.topology import graph_components, halfedges, next_halfedge, previous_halfedge, twins
+from ..mesh.edge_flips import flip_in_place
+from ..mesh.geometry import (
+    angle_defects,
+    angles_from_lengths,
+    cross3,
+    face_areas,
+    halfedge_lengths,
+    vertex_areas,
+)
+from ..mesh.topology import (
+    boundary_edges,
+    graph_components,
+    halfedges,
+    next_halfedge,
+    pair_keys,
+    previous_halfedge,
+    twins,
+)
 
 # Of the vertices that could go, those above this quantile of the cost wait for a later round.
 QUANTILE = 0.6
@@ -27,8 +43,18 @@ LEAST_SHAPE = 1e-4
 HIGH_DEGREE = 13
 # Coarse surfaces of one fine one are the same until they have so many times their vertices.
 COMMON = 4
+# A half and its image have the area of the whole but for this share, or they are no image of it.
+WHOLE = 0.05
 # Rounds end when one removes a smaller share of the vertices.
 LEAST_PROGRESS = 0.01
+
+
+@dataclass(frozen=True)
+class Mirrored:
+    """The mirror image (n,) of every vertex, and which are on the one side or in the plane, (n,) bool."""
+
+    image: np.ndarray
+    side: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -39,10 +65,11 @@ class CoarseSurface:
     ----------
     kept (c,) : vertices of the fine surface
     positions (c,3), triangles (t,3) : of them
-    curvature (c,) : angle defects of the fine surface, radians; 0 on the boundary
+    curvature (c,) : angle defects of the fine surface, radians; on the boundary beside a straight one
     area (c,) : of the fine surface, at each vertex, their sum is 1
     boundary (c,) bool : which are on a boundary
     size : square root of the area of the fine surface, in the units of the positions
+    mirrored : of one that is its own mirror image, see `HalfSurface`; None of others
     """
 
     kept: np.ndarray
@@ -52,6 +79,7 @@ class CoarseSurface:
     area: np.ndarray
     boundary: np.ndarray
     size: float
+    mirrored: Mirrored | None = None
 
 
 @dataclass(frozen=True)
@@ -115,23 +143,147 @@ def coarsening(positions: np.ndarray, triangles: np.ndarray, count: int, line: n
     line (n,) bool: vertices that collapse only among themselves, as those of a boundary do, so that lines stay lines
     """
     n = len(positions)
-    tail, head = halfedges(triangles)
-    border = np.flatnonzero(twins(triangles) < 0)
     on_boundary = np.zeros(n, dtype=bool)
-    on_boundary[tail[border]] = True
-    lengths = halfedge_lengths(positions, triangles).reshape(-1, 3)
-    curvature = angle_defects(triangles, angles_from_lengths(lengths), np.flatnonzero(on_boundary), n)
-    # A boundary is closed by a cone, so that every vertex is surrounded by faces.
-    _, label = graph_components(tail[border], head[border], n)
-    _, loop = np.unique(label[tail[border]], return_inverse=True)
-    faces = np.concatenate([triangles, np.column_stack([head[border], tail[border], n + loop.ravel()])])
-    kind = np.zeros(int(faces.max()) + 1 if len(border) else n, dtype=np.int64)
+    on_boundary[boundary_edges(triangles)[:, 0]] = True
+    curvature = _curvature(positions, triangles, on_boundary)
+    kind = 2 * on_boundary.astype(np.int64)
     if line is not None:
-        kind[:n][line] = 1
-    kind[:n][on_boundary] += 2
-    kind[n:] = -1
-    begun = Coarsening(positions, on_boundary, kind, faces, curvature, vertex_areas(positions, triangles), n)
-    return begun.towards(COMMON * count, 0)
+        kind[line] += 1
+    return _begun(positions, triangles, kind, on_boundary, curvature).towards(COMMON * count, 0)
+
+
+def _curvature(positions: np.ndarray, triangles: np.ndarray, on_boundary: np.ndarray) -> np.ndarray:
+    """Angle defects (n,) of a surface with this boundary (n,) bool, beside a straight one there."""
+    angles = angles_from_lengths(halfedge_lengths(positions, triangles).reshape(-1, 3))
+    return angle_defects(triangles, angles, np.flatnonzero(on_boundary), len(positions))
+
+
+def _begun(positions, triangles, kind: np.ndarray, on_boundary: np.ndarray, curvature: np.ndarray) -> Coarsening:
+    """A surface before the first collapse, whose vertices are of these kinds (n,)."""
+    n = len(positions)
+    # A boundary is closed by a cone, so that every vertex is surrounded by faces.
+    tail, head = boundary_edges(triangles).T
+    _, label = graph_components(tail, head, n)
+    _, loop = np.unique(label[tail], return_inverse=True)
+    faces = np.concatenate([triangles, np.column_stack([head, tail, n + loop.ravel()])])
+    kind = np.concatenate([kind, np.full(int(loop.max(initial=-1)) + 1, -1)])
+    return Coarsening(positions, on_boundary, kind, faces, curvature, vertex_areas(positions, triangles), n)
+
+
+@dataclass(frozen=True)
+class HalfSurface:
+    """One half of a surface that is nearly its own mirror image, on its way to coarse ones, which are exactly so.
+
+    begun : the half, with its border in the plane; plane (n,) bool : vertices there; image (n,) : the vertex of the
+    surface nearest to the mirror image of each; height (n,) : over the plane; normal (3,) : of it
+    """
+
+    begun: Coarsening
+    plane: np.ndarray
+    image: np.ndarray
+    height: np.ndarray
+    normal: np.ndarray
+
+    def ended(self, count: int, trial: int = 0) -> CoarseSurface | None:
+        """A coarse surface of about `count` vertices, a half and its image; None where they would meet elsewhere than
+        along their borders."""
+        half = self.begun.ended(count // 2, trial)
+        plane, n = self.plane[half.kept], len(half.kept)
+        triangles = _without_chords(half.positions, half.triangles, plane)
+        if triangles is None:
+            return None
+        off = np.flatnonzero(~plane)
+        image = np.arange(n)
+        image[off] = n + np.arange(len(off))
+        beyond = half.positions[off] - 2 * self.height[half.kept[off], None] * self.normal
+        twice = np.where(plane, 2.0, 1.0)
+        return CoarseSurface(
+            kept=np.concatenate([half.kept, self.image[half.kept[off]]]),
+            positions=np.concatenate([half.positions, beyond]),
+            triangles=np.concatenate([triangles, image[triangles][:, ::-1]]),
+            curvature=np.concatenate([half.curvature * twice, half.curvature[off]]),
+            area=np.concatenate([half.area * twice, half.area[off]]) / 2,
+            boundary=np.concatenate([half.boundary, half.boundary[off]]),
+            size=half.size * float(np.sqrt(2)),
+            mirrored=Mirrored(np.concatenate([image, off]), np.arange(n + len(off)) < n),
+        )
+
+
+def half_coarsening(
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    count: int,
+    plane: np.ndarray,
+    image: np.ndarray,
+    height: np.ndarray,
+    normal: np.ndarray,
+) -> HalfSurface | None:
+    """One half of a surface (n,3), (m,3) on its way to coarse ones of `count` vertices; None where the surface does not
+    fall into two along a line of vertices by the plane.
+
+    plane (n,) bool, image (n,), height (n,), normal (3,): see `HalfSurface`
+    """
+    n, outline = len(positions), boundary_edges(triangles)
+    half = triangles[((height >= 0) | plane)[triangles].all(axis=1)]
+    half = half[~plane[half].all(axis=1)]
+    half = _largest(half, n)
+    border = boundary_edges(half)
+    outer = np.isin(pair_keys(*border.T), pair_keys(*outline.T))
+    in_plane = plane[border].all(axis=1)
+    area, whole = (face_areas(positions, part).sum() for part in (half, triangles))
+    if not (outer ^ in_plane).all() or abs(2 * area - whole) > WHOLE * whole:
+        return None
+    # Not where two fans of the half meet in a vertex.
+    if np.bincount(border[:, 0], minlength=1).max(initial=0) > 1:
+        return None
+    if 2 * _euler(half) - (len(np.unique(border[in_plane])) - int(in_plane.sum())) != _euler(triangles):
+        return None
+    line, on_boundary = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    line[border[in_plane]] = on_boundary[outline] = True
+    above = np.where(line, height, 0.0)
+    points = positions - above[:, None] * normal
+    # Half of what the whole has in the plane.
+    curvature = _curvature(points, half, on_boundary)
+    curvature -= np.where(line, np.where(on_boundary, np.pi / 2, np.pi), 0.0)
+    kind = 3 * line.astype(np.int64)
+    kind[on_boundary] = 2
+    corners = np.flatnonzero(line & on_boundary)
+    kind[corners] = 4 + np.arange(len(corners))
+    begun = _begun(points, half, kind, on_boundary, curvature)
+    begun = replace(begun, left=len(np.unique(half)))
+    return HalfSurface(begun.towards(COMMON * count // 2, 0), line, image, height - above, normal)
+
+
+def _largest(triangles: np.ndarray, n: int) -> np.ndarray:
+    """The triangles (t,3) of the part with most of them, of those that hang together."""
+    _, label = graph_components(*halfedges(triangles), n)
+    label = label[triangles[:, 0]]
+    return triangles[label == np.bincount(label, minlength=1).argmax()]
+
+
+def _euler(triangles: np.ndarray) -> int:
+    """Euler's number of a manifold."""
+    edges = (3 * len(triangles) + len(boundary_edges(triangles))) // 2
+    return len(np.unique(triangles)) - edges + len(triangles)
+
+
+def _without_chords(positions: np.ndarray, triangles: np.ndarray, plane: np.ndarray) -> np.ndarray | None:
+    """A half (t,3) whose inner edges with both ends in the plane (c,) bool are flipped; None where one cannot be: with
+    the image of the half, four triangles would meet there."""
+    twin = twins(triangles)
+    tail, head = halfedges(triangles)
+    chords = np.flatnonzero((twin > np.arange(len(twin))) & plane[tail] & plane[head])
+    if not len(chords):
+        return triangles
+    other = np.stack([tail[previous_halfedge(chords)], tail[previous_halfedge(twin[chords])]], axis=1)
+    keys = pair_keys(*other.T)
+    beside = np.concatenate([chords // 3, twin[chords] // 3])
+    known = np.isin(keys, pair_keys(tail, head)) | plane[other].all(axis=1) | (other[:, 0] == other[:, 1])
+    if known.any() or len(np.unique(keys)) < len(keys) or len(np.unique(beside)) < len(beside):
+        return None
+    flipped = triangles.copy()
+    flip_in_place(flipped, twin, chords)
+    return flipped
 
 
 class _ShrinkingMesh:

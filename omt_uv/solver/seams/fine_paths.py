@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
 
 from ..analysis.straight_paths import EdgeNetwork, edge_network, straighten
+from ..analysis.symmetry_plane import SymmetryPlane
 from ..cutting.component import CutComponent
-from ..mesh.geometry import edge_lengths
+from ..mesh.geometry import below_one, edge_lengths, vertex_normals
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .coarse_surface import CoarseSurface
 from .cut_tree import between_nodes, stretches
@@ -32,13 +34,22 @@ FEWER_STEPS = 2.0
 WIDER = (8.0, 64.0, np.inf)
 
 
+# Share of the vertices that have an image in a component with a mirror plane, and in a scan with one.
+MIRRORED_SHARE = (0.97, 0.9)
+# Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
+EXACT = 1e-4
+NEARLY = 0.03
+
+
 @dataclass(frozen=True)
 class FineMirror:
-    """The mirror image (n,) of every vertex of a component, its height (n,) over the plane, and which lie in it or on a
-    line of edges along it, (n,) bool; exact: whether images are vertices, nearly all, and no such line is needed."""
+    """The mirror image (n,) of every vertex of a component, its height (n,) over the plane, the normal (3,) of that,
+    and which lie in it or on a line of edges along it, (n,) bool; exact: whether images are vertices, nearly all, and
+    no such line is needed."""
 
     image: np.ndarray
     height: np.ndarray
+    normal: np.ndarray
     plane: np.ndarray
     exact: bool
 
@@ -46,6 +57,35 @@ class FineMirror:
     def side(self) -> np.ndarray:
         """Vertices (n,) bool on the one side."""
         return self.height >= 0
+
+
+def fine_mirror(component: CutComponent, plane: SymmetryPlane, own: np.ndarray, real: np.ndarray) -> FineMirror | None:
+    """The mirror image of a component in itself, if its vertices have one, and some are in the plane.
+
+    own (m,3) : where its vertices real (n,) bool are, in the units of the plane
+    """
+    points = component.positions
+    own, exponent = below_one(own)
+    offset = np.ldexp(plane.offset, -exponent)
+    scale = np.ptp(points, axis=0).max() / max(np.ptp(own, axis=0).max(), 1e-300)
+    height = points @ plane.normal
+    height = height - np.mean(height[real] - scale * (own @ plane.normal - offset))
+    distance, image = cKDTree(points).query(_reflected(points, height, plane.normal))
+    in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
+    if np.mean(distance <= EXACT) >= MIRRORED_SHARE[0] and in_plane.any():
+        return FineMirror(image, height, plane.normal, in_plane, exact=True)
+    if np.mean(distance <= NEARLY) < MIRRORED_SHARE[1]:
+        return None
+    # The other side of what is thin may be nearer.
+    normals = NEARLY * vertex_normals(points, component.triangles)
+    there = _reflected(normals, normals @ plane.normal, plane.normal)
+    places = np.concatenate([_reflected(points, height, plane.normal), there], axis=1)
+    _, image = cKDTree(np.concatenate([points, normals], axis=1)).query(places)
+    return with_line(component, FineMirror(image, height, plane.normal, in_plane, exact=False))
+
+
+def _reflected(points: np.ndarray, height: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    return points - 2 * height[:, None] * normal
 
 
 def with_line(component: CutComponent, mirror: FineMirror) -> FineMirror | None:
@@ -57,7 +97,7 @@ def with_line(component: CutComponent, mirror: FineMirror) -> FineMirror | None:
     plane, image = np.zeros(len(height), dtype=bool), mirror.image.copy()
     plane[crossing[np.arange(len(crossing)), np.abs(height[crossing]).argmin(axis=1)]] = True
     image[plane] = np.flatnonzero(plane)
-    return FineMirror(image, height, plane, exact=False) if plane.any() else None
+    return replace(mirror, image=image, plane=plane, exact=False) if plane.any() else None
 
 
 def carried(

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.geometry import edge_lengths
 from ..mesh.topology import across_edges, halfedges, twins
-from .coarse_surface import CoarseSurface
+from .coarse_surface import CoarseSurface, Mirrored
 
 # Share of the vertices in a mirror plane that symmetric cuts have to be able to reach.
 REACHED = 0.9
@@ -76,14 +76,6 @@ class PathGraph:
         vertices = self.ends[steps].ravel()
         among[vertices] = among[self.image[vertices]] = True
         return np.flatnonzero(among & ~self.boundary)
-
-
-@dataclass(frozen=True)
-class Mirrored:
-    """The mirror image (n,) of every vertex, and which are on the one side or in the plane, (n,) bool."""
-
-    image: np.ndarray
-    side: np.ndarray
 
 
 def path_graph(

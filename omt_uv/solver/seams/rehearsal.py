@@ -24,15 +24,13 @@ from ..mesh.surface import Surface, triangle_surface
 from ..mesh.topology import across_edges, boundary_edges, halfedges, pair_keys, paired, twins
 from ..progress import Steps, part_of
 from .coarse_cut import CoarseCut, best_of
-from .coarse_surface import CoarseSurface
+from .coarse_surface import WHOLE, CoarseSurface
 from .cut_tree import Cut, Task
 from .growth import EVEN, grow, grown_by_one
 from .improvement import MOST_REGROWN, rerouted, trimmed
 from .options import SPREAD_BY_SHEAR
 from .path_graph import path_to
 
-# A half and its image have the area of the whole but for this share, or they are no image of it.
-WHOLE = 0.05
 # The least share that one of two triangles may have of both when the edge between them is flipped.
 THIN = 0.05
 # What a rehearsal makes more of a bound of the spread, at most: squared.
@@ -61,7 +59,6 @@ class Rehearsal:
 
     Attributes
     ----------
-    component, normal (3,) : and the normal of its mirror plane, None where it has none
     log_density : half the logarithm of the density (c,) at the vertices of a coarse surface, or None
     sheared : gives the square of log(shear) of a small surface along its seams for such a density (n,), None where it
         has no map of its own; itself None where predictions have to do
@@ -69,7 +66,6 @@ class Rehearsal:
     """
 
     component: CutComponent
-    normal: np.ndarray | None
     log_density: Callable[[CoarseSurface], np.ndarray | None]
     sheared: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None
     known: dict[bytes, float | None]
@@ -81,7 +77,7 @@ class Rehearsal:
             return None
         ends = self.component.ends[found.base]
         near_base = cKDTree(coarse.positions).query(self.component.positions[ends])[1].reshape(-1, 2)
-        opening = opened(found, near_base, self.normal)
+        opening = opened(found, near_base)
         density = self.log_density(coarse)
         density = None if density is None else density[opening.vertex]
         parts = opening.positions, opening.triangles, opening.seams
@@ -186,22 +182,24 @@ class OpenSurface:
     vertex: np.ndarray
 
 
-def opened(found: CoarseCut, near_base: np.ndarray, normal: np.ndarray | None) -> OpenSurface:
+def opened(found: CoarseCut, near_base: np.ndarray) -> OpenSurface:
     """The coarse surface of a cut with its edges along it; of a symmetric one, one half and its image if that is alike.
 
-    near_base (b,2) : the coarse vertices nearest to the ends of what was cut before; normal : of the mirror plane
+    near_base (b,2) : the coarse vertices nearest to the ends of what was cut before
     """
     coarse, graph = found.setting.coarse, found.task.graph
     steps = np.concatenate([graph.ends[found.cut.steps], near_base])
-    if found.mirror is not None and normal is not None:
+    if found.mirror is not None:
         plane, side = found.mirror.plane[coarse.kept], found.mirror.side[coarse.kept]
+        if coarse.mirrored is not None:
+            plane, side = graph.in_plane, coarse.mirrored.side
         half = coarse.triangles[(plane | side)[coarse.triangles].all(axis=1)]
         half = half[~plane[half].all(axis=1)]
         if _is_half(coarse, half, plane):
             here = np.zeros(len(plane), dtype=bool)
             here[half] = True
             half, seams = _along(coarse.positions, half, steps[here[steps].all(axis=1)])
-            return _doubled(coarse.positions, half, seams, plane, found.mirror.height[coarse.kept], normal)
+            return _doubled(coarse.positions, half, seams, plane, found.mirror.height[coarse.kept], found.mirror.normal)
     triangles, seams = _along(coarse.positions, coarse.triangles, steps)
     if found.mirror is not None:
         _, images = _along(coarse.positions, triangles, graph.image[steps])

@@ -17,13 +17,12 @@ from scipy.spatial import cKDTree
 from ..analysis.seam_costs import SeamCosts
 from ..analysis.symmetry_plane import NEAR
 from ..cutting.component import CutComponent, TurnedCopies, fingerprint
-from ..mesh.geometry import below_one
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from .coarse_cut import CoarseCut, Found, Setting, best_of, hub
-from .coarse_surface import Coarsening, CoarseSurface, coarsening
+from .coarse_surface import Coarsening, CoarseSurface, HalfSurface, coarsening, half_coarsening
 from .cut_tree import Cut, Task, cut_along
-from .fine_paths import FineMirror, with_line
+from .fine_paths import FineMirror, fine_mirror, with_line
 from .growth import growing
 from .improvement import improved, rerouted, trimmed
 from .options import SPREAD_BY_SHEAR, SearchOptions
@@ -32,11 +31,6 @@ from .predicted_scale import ScaleModel
 from .rehearsal import Rehearsal
 from .symmetric_base import symmetric_base
 
-# Share of the vertices that have an image in a component with a mirror plane, and in a scan with one.
-MIRRORED_SHARE = (0.97, 0.9)
-# Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
-EXACT = 1e-4
-NEARLY = 0.03
 # Seams of what is nearly its own image are symmetric unless that makes them cost so many times what others do: of a
 # body, and, with all between, of one that is hardly a mirror image any more.
 DEARER = (1.5, 1.0)
@@ -108,7 +102,7 @@ class SeamSearch:
     stays_whole: bool = False
     as_drawn: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
-    begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
+    begun: dict[tuple, tuple[np.ndarray, Coarsening | HalfSurface | None]] = field(default_factory=dict)
     models: dict[int, tuple[CoarseSurface, ScaleModel]] = field(default_factory=dict)
     asked: float = 0.0
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
@@ -315,11 +309,9 @@ class SeamSearch:
         return best.carried(component)
 
     def _rehearsal(self, component: CutComponent) -> Rehearsal:
-        plane = self.costs().plane
-        normal = None if plane is None else plane.normal
         # Where the coarse surface is the surface itself, the map that is to be made tells as much as a rehearsal.
         rehearse = self.rehearse if component.vertex_count > self.options.vertices else None
-        return Rehearsal(component, normal, partial(self._log_density, component), rehearse, self.rehearsed)
+        return Rehearsal(component, partial(self._log_density, component), rehearse, self.rehearsed)
 
     def _added(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut and arcs added to it: where it was tried by a map, that shears less with any more of them."""
@@ -404,31 +396,29 @@ class SeamSearch:
     ) -> tuple[CoarseSurface, ScaleModel]:
         """One of the coarse surfaces of a component, whose mirror plane stays a line, and its model."""
         line, count = None if mirror is None else mirror.plane, round(finer * self.options.vertices)
-        name = (id(component.triangles), b"" if line is None else line.tobytes())
+        parts, coarse = (component.positions, component.triangles, self.options.vertices), None
+        if mirror is not None:
+            seen = mirror.plane, mirror.image, mirror.height, mirror.normal
+            half = self._begun(component, line, partial(half_coarsening, *parts, *seen))
+            coarse = None if half is None else half.ended(count, trial)
+        if coarse is None:
+            coarse = self._begun(component, line, partial(coarsening, *parts, line)).ended(count, trial)
+        return coarse, ScaleModel.of(coarse, self._log_density(component, coarse))
+
+    def _begun(self, component: CutComponent, line: np.ndarray | None, begin: partial):
+        """What a component, with a line (n,) bool or none, is begun to be made coarse by."""
+        name = (id(component.triangles), b"" if line is None else line.tobytes(), begin.func)
         if name not in self.begun:
             # With the array: as long as it is here, no other one has its name.
-            begun = coarsening(component.positions, component.triangles, self.options.vertices, line)
-            self.begun[name] = component.triangles, begun
-        coarse = self.begun[name][1].ended(count, trial)
-        return coarse, ScaleModel.of(coarse, self._log_density(component, coarse))
+            self.begun[name] = component.triangles, begin()
+        return self.begun[name][1]
 
     def _mirror(self, component: CutComponent) -> FineMirror | None:
         """The mirror image of the component in itself, if its vertices have one, and some are in the plane."""
         plane, real = self.costs().plane, component.vertex_ids < len(self.surface.positions)
         if plane is None or not self.options.symmetric:
             return None
-        points, own = component.positions, self.surface.positions[component.vertex_ids[real]]
-        own, exponent = below_one(own)
-        offset = np.ldexp(plane.offset, -exponent)
-        scale = np.ptp(points, axis=0).max() / max(np.ptp(own, axis=0).max(), 1e-300)
-        height = points @ plane.normal
-        height = height - np.mean(height[real] - scale * (own @ plane.normal - offset))
-        distance, image = cKDTree(points).query(points - 2 * height[:, None] * plane.normal)
-        in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
-        mirror = FineMirror(image, height, in_plane, exact=True)
-        if np.mean(distance <= EXACT) >= MIRRORED_SHARE[0] and in_plane.any():
-            return mirror
-        return with_line(component, mirror) if np.mean(distance <= NEARLY) >= MIRRORED_SHARE[1] else None
+        return fine_mirror(component, plane, self.surface.positions[component.vertex_ids[real]], real)
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""

@@ -80,7 +80,7 @@ def test_a_line_along_a_mirror_plane_that_is_none_of_edges_is_cut_all_the_same()
     assert graph.in_plane[way].all()
     # Of the line every other vertex is missing, and all on the other side.
     plane[coarse.kept[way[::2]]] = True
-    mirror = FineMirror(image, height, plane, exact=False)
+    mirror = FineMirror(image, height, np.array([0.0, 1, 0]), plane, exact=False)
     chosen = carried(component, coarse, graph, graph.steps_of(way), start, mirror)
     assert component.length[chosen].sum() > 0.9 * np.linalg.norm(np.diff(coarse.positions[way], axis=0), axis=1).sum()
 
@@ -201,7 +201,7 @@ def test_a_line_along_a_plane_ends_where_that_crosses_the_boundary(seed):
     V, F = meshes.random_disk(300, seed)
     component = short_cuts.component_of(V, F)
     height = component.positions[:, 0] - 0.5
-    mirror = FineMirror(np.arange(len(V)), height, np.zeros(len(V), dtype=bool), exact=False)
+    mirror = FineMirror(np.arange(len(V)), height, np.array([1.0, 0, 0]), np.zeros(len(V), dtype=bool), exact=False)
     line = with_line(component, mirror).plane
     ends = boundary_edges(component.triangles)
     crossing = ends[height[ends].prod(axis=1) <= 0]

@@ -50,7 +50,7 @@ def test_an_opened_surface_is_the_coarse_one_cut_along_its_steps(monkeypatch, me
     assert len(seen)
     for rehearsal, found, value in seen:
         coarse = found.setting.coarse
-        opening = opened(found, np.zeros((0, 2), np.int64), rehearsal.normal)
+        opening = opened(found, np.zeros((0, 2), np.int64))
         area = face_areas(opening.positions, opening.triangles).sum()
         whole = face_areas(coarse.positions, coarse.triangles).sum()
         assert abs(area - whole) < 0.06 * whole
@@ -66,10 +66,10 @@ def test_an_opened_surface_is_the_coarse_one_cut_along_its_steps(monkeypatch, me
 def test_a_symmetric_cut_is_rehearsed_on_a_surface_that_is_its_own_image(monkeypatch):
     seen, _ = rehearsals(monkeypatch, triangle_surface(*meshes.two_bumps()), 1.3)
     assert any(found.mirror is not None for _, found, _ in seen)
-    for rehearsal, found, _ in seen:
+    for _, found, _ in seen:
         if found.mirror is None:
             continue
-        P = opened(found, np.zeros((0, 2), np.int64), rehearsal.normal).positions
+        P = opened(found, np.zeros((0, 2), np.int64)).positions
         image = P * [-1, 1, 1] + [1, 0, 0]
         order, images = np.lexsort(np.round(P, 9).T), np.lexsort(np.round(image, 9).T)
         assert np.allclose(P[order], image[images], atol=1e-9)

@@ -256,7 +256,7 @@ def test_densities_of_a_coarse_surface_are_half_logarithms_about_their_mean():
 
 def rehearsed(values):
     """A rehearsal that tells these squares of log(shear) by the cost of a cut."""
-    told = rehearsal.Rehearsal(None, None, None, None, {})
+    told = rehearsal.Rehearsal(None, None, None, {})
     asked = []
 
     def of(found):

@@ -49,7 +49,7 @@ def mine(monkeypatch):
         return worked(one.cut.shears)
 
     monkeypatch.setattr(Rehearsal, "of", of)
-    return Rehearsal(None, None, None, None, {}), asked
+    return Rehearsal(None, None, None, {}), asked
 
 
 def price(cost, shears, asked):
@@ -193,7 +193,7 @@ def test_the_same_coarse_surface_is_mapped_once(state, monkeypatch):
     opening = SimpleNamespace(
         positions=np.eye(3), triangles=np.array([[0, 1, 2]]), seams=np.zeros((0, 2), int), vertex=np.array([2, 0, 1])
     )
-    monkeypatch.setattr(rehearsal, "opened", lambda found, near, normal: (asked.append(near.tolist()), opening)[1])
+    monkeypatch.setattr(rehearsal, "opened", lambda found, near: (asked.append(near.tolist()), opening)[1])
 
     def sheared(surface, density):
         asked.append(None if density is None else density.tolist())
@@ -203,7 +203,7 @@ def test_the_same_coarse_surface_is_mapped_once(state, monkeypatch):
 
     log = (lambda coarse: np.array([1.0, 2.0, 3.0])) if state == "dense" else (lambda coarse: None)
     component = SimpleNamespace(ends=np.array([[0, 1], [1, 2]]), positions=np.eye(3) * 1.1)
-    one = Rehearsal(component, None, log, None if state == "no rehearsal" else sheared, {})
+    one = Rehearsal(component, log, None if state == "no rehearsal" else sheared, {})
     boundary = np.array([state not in ("no boundary", "no steps")])
     coarse = SimpleNamespace(positions=np.eye(3)[[2, 1, 0]], boundary=boundary)
     steps = np.zeros(0 if state == "no steps" else 2, int)
