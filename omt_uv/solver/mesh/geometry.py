@@ -13,6 +13,7 @@ LEAST_STIFFNESS = 1e-3
 CHUNK = 1 << 14
 # Triangles whose gradients are kept: of more, the sides that make them, which take half of the memory.
 KEPT_HATS = 1_200_000
+FOURTH_POWERS = -260  # those of what is below two to this power are none: the squares of areas
 
 
 def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -96,8 +97,7 @@ def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray
 
 def places(points: np.ndarray) -> np.ndarray:
     """A number (n,), from 0 on, for each of points (n,d): the same where they lie on one another."""
-    # Adding zero makes -0.0 and 0.0 the same.
-    return np.unique(points + 0.0, axis=0, return_inverse=True)[1].ravel()
+    return np.unique(points + 0.0, axis=0, return_inverse=True)[1].ravel()  # -0.0 + 0.0 is 0.0
 
 
 def bounds(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +139,9 @@ def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         x, y, z = _double_areas(positions, some)
         return 0.5 * np.sqrt(x * x + y * y + z * z)
 
-    return part_by_part(areas, triangles)
+    found = part_by_part(areas, triangles)
+    points, exponent = below_one(positions) if found.max(initial=0.0) == 0 else (positions, 0)
+    return np.ldexp(face_areas(points, triangles), 2 * exponent) if exponent < FOURTH_POWERS else found
 
 
 def below_one(points: np.ndarray) -> tuple[np.ndarray, int]:

@@ -16,7 +16,7 @@ from ..analysis.symmetry_plane import MirrorImages
 from ..linalg.minimum_cut import capacities
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
-from ..mesh.geometry import cotangent_laplacian, edge_lengths, face_areas
+from ..mesh.geometry import below_one, cotangent_laplacian, edge_lengths, face_areas
 from ..mesh.topology import pair_keys
 from ..packing.pack_square import pack
 from ..packing.turning import in_smallest_box
@@ -117,9 +117,9 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
     """The piece (m,) of every triangle where a long chart with map uv (n,2) is cut across in `count` of about the same
     length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
     graph = PolygonGraph.of(chart)
-    middle = graph.places(chart, uv)
-    middle -= graph.area @ middle / graph.area.sum()
-    along = middle @ np.linalg.eigh(middle.T @ (graph.area[:, None] * middle))[1][:, 1]
+    middle, share = below_one(graph.places(chart, uv))[0], graph.area / graph.area.sum()
+    middle -= share @ middle
+    along = middle @ np.linalg.eigh(middle.T @ (share[:, None] * middle))[1][:, 1]
     cut = _across(graph, along, graph.prices(chart, cost), count)
     return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 

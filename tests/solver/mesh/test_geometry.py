@@ -155,3 +155,10 @@ def test_a_triangle_with_two_corners_in_one_place_is_as_low_as_any_without_an_ar
         assert np.isfinite(hats).all() and abs(hats.sum()) < 1e-6 * np.abs(hats).max()
     area, hats = hat_gradients(0 * p, np.arange(3)[None])
     assert area[0] > 0 and np.isfinite(hats).all()
+
+
+@pytest.mark.parametrize("size", [2.0**-500, 2.0**-200, 2.0**200])
+def test_areas_are_those_of_any_size(size):
+    V, F = meshes.icosphere(1)
+    assert np.array_equal(face_areas(size * V, F), size**2 * face_areas(V, F))
+    assert not face_areas(0 * V, F).any() and not len(face_areas(size * V, F[:0]))
