@@ -189,7 +189,7 @@ class HalfSurface:
         along their borders."""
         half = self.begun.ended(count // 2, trial)
         plane, n = self.plane[half.kept], len(half.kept)
-        triangles = _without_chords(half.positions, half.triangles, plane)
+        triangles = _without_chords(half.triangles, plane)
         if triangles is None:
             return None
         off = np.flatnonzero(~plane)
@@ -267,7 +267,7 @@ def _euler(triangles: np.ndarray) -> int:
     return len(np.unique(triangles)) - edges + len(triangles)
 
 
-def _without_chords(positions: np.ndarray, triangles: np.ndarray, plane: np.ndarray) -> np.ndarray | None:
+def _without_chords(triangles: np.ndarray, plane: np.ndarray) -> np.ndarray | None:
     """A half (t,3) whose inner edges with both ends in the plane (c,) bool are flipped; None where one cannot be: with
     the image of the half, four triangles would meet there."""
     twin = twins(triangles)
