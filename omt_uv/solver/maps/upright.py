@@ -36,6 +36,10 @@ STEEP = 0.1
 RIDGED = 3.0
 # One end of a ridge is higher where heights and places along it have this correlation.
 HIGHER = 0.02
+# Level directions say how an island lies where their gradients are so many times as parallel as those of the height.
+TELLING = 1.25
+# The axes of what is its own mirror image are told where one is longer by so much, next to both, squared.
+UNEVEN = 0.1
 QUARTER = np.pi / 2
 
 
@@ -161,7 +165,7 @@ def _upward(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None) -> np
     """Direction (k,) in the map in which the islands rise in space; nan for those that do not rise anywhere."""
     area = signed_areas(islands.uv, islands.triangles)
     whole = np.maximum(np.bincount(islands.owner, np.abs(area), islands.count), np.finfo(float).tiny)
-    upward = np.full(islands.count, np.nan)
+    upward, rising, level = np.full(islands.count, np.nan), np.zeros(islands.count), []
     # A wall rises by 1 per length where the map is as large as the surface.
     for k, axis in enumerate((up, *_level(up, viewers))):
         given = (islands.triangles, islands.owner, area)
@@ -170,12 +174,29 @@ def _upward(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None) -> np
         total = np.stack([np.bincount(islands.owner, rise[:, d], islands.count) for d in range(2)], axis=1)
         size = np.bincount(islands.owner, np.hypot(*rise.T), islands.count)
         steep = size >= STEEP * whole
-        sure = (np.hypot(*total.T) >= PARALLEL * size) & steep
+        parallel = np.hypot(*total.T) / np.maximum(size, np.finfo(float).tiny)
+        sure = (parallel >= PARALLEL) & steep
         upward = np.where(np.isnan(upward) & sure, np.arctan2(total[:, 1], total[:, 0]), upward)
         if k == 0:
-            ridge = _along_ridge(islands, area, height, rise)
-            upward = np.where(np.isnan(upward) & steep, ridge, upward)
-    return upward
+            ridge = np.where(steep, _along_ridge(islands, area, height, rise), np.nan)
+            # Level directions tell more of what rises from two sides.
+            rising = np.where(sure, parallel, np.where(np.isfinite(ridge), 0.0, np.inf))
+            upward = np.where(np.isnan(upward), ridge, upward)
+        else:
+            level.append((total, parallel))
+    totals, parallels = (np.stack(part, axis=-1) for part in zip(*level, strict=True))
+    told = parallels.max(axis=1) > TELLING * rising
+    return np.where(told, _straightened(upward, totals), upward)
+
+
+def _straightened(upward: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Directions (k,) along the axes of what is its own mirror image, by the sums (k,2,2) of the gradients of two level
+    directions of space: those across its plane and along it are at right angles, in the map as in space. Where neither
+    is much greater than the other, any two are, and a direction stays as it is."""
+    xx, xy, yy = ((level[:, i] * level[:, j]).sum(axis=1) for i, j in ((0, 0), (0, 1), (1, 1)))
+    mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    turn = _least_turn(0.5 * np.arctan2(2 * xy, xx - yy) - upward)
+    return upward + np.where(half > UNEVEN * mean, turn, 0.0)
 
 
 def _rises(

@@ -104,7 +104,7 @@ class Setting:
     @staticmethod
     def of(component: CutComponent, coarse: CoarseSurface, base, mirror, model, tip_factor) -> Setting:
         tree = cKDTree(coarse.positions)
-        mirrored = coarse.mirrored
+        mirrored = coarse.images
         if mirror is not None and mirrored is None:
             plane, side = mirror.plane[coarse.kept], mirror.side[coarse.kept]
             image = np.arange(len(plane))

@@ -69,7 +69,7 @@ class CoarseSurface:
     area (c,) : of the fine surface, at each vertex, their sum is 1
     boundary (c,) bool : which are on a boundary
     size : square root of the area of the fine surface, in the units of the positions
-    mirrored : of one that is its own mirror image, see `HalfSurface`; None of others
+    images : of one that is its own mirror image, see `HalfSurface`; None of others
     """
 
     kept: np.ndarray
@@ -79,7 +79,7 @@ class CoarseSurface:
     area: np.ndarray
     boundary: np.ndarray
     size: float
-    mirrored: Mirrored | None = None
+    images: Mirrored | None = None
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class HalfSurface:
             area=np.concatenate([half.area * twice, half.area[off]]) / 2,
             boundary=np.concatenate([half.boundary, half.boundary[off]]),
             size=half.size * float(np.sqrt(2)),
-            mirrored=Mirrored(np.concatenate([image, off]), np.arange(n + len(off)) < n),
+            images=Mirrored(np.concatenate([image, off]), np.arange(n + len(off)) < n),
         )
 
 

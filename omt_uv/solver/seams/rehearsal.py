@@ -191,8 +191,8 @@ def opened(found: CoarseCut, near_base: np.ndarray) -> OpenSurface:
     steps = np.concatenate([graph.ends[found.cut.steps], near_base])
     if found.mirror is not None:
         plane, side = found.mirror.plane[coarse.kept], found.mirror.side[coarse.kept]
-        if coarse.mirrored is not None:
-            plane, side = graph.in_plane, coarse.mirrored.side
+        if coarse.images is not None:
+            plane, side = graph.in_plane, coarse.images.side
         half = coarse.triangles[(plane | side)[coarse.triangles].all(axis=1)]
         half = half[~plane[half].all(axis=1)]
         if _is_half(coarse, half, plane):

@@ -1,5 +1,7 @@
 """Islands as an artist lays them: edges along the axes, up in the world up in the map, mirror images mirrored."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -175,3 +177,32 @@ def test_creases_decide_where_neither_sides_nor_outline_have_a_direction(angle, 
     ends = found[on][np.argsort(chart.vertices[on, 1])][[0, -1]]
     along = np.abs(ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     assert (along.min() < 0.02) == straight
+
+
+def pelt(aside, seed=5, count=500):
+    """A back with flanks, which rises a little along it and, by `aside`, to one side, as one that raises a leg; and its
+    map, with the back upright."""
+    P = np.random.default_rng(seed).random((count, 2)) * 2 - 1
+    P = P[np.linalg.norm(P, axis=1) < 1] * [2, 2.5]
+    P = np.concatenate([P, P * [-1, 1]])
+    T = Delaunay(P).simplices
+    T = T[np.abs(signed_areas(P, T)) > 1e-9]
+    V = np.column_stack([np.sin(P[:, 0]), P[:, 1], np.cos(P[:, 0]) + 0.1 * P[:, 1] + aside * P[:, 0]])
+    (chart,) = strict_charts(triangle_surface(V, np.where(signed_areas(P, T)[:, None] > 0, T, T[:, ::-1])))
+    return chart, P[chart.vertex_ids]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.9])
+@pytest.mark.parametrize("aside", [-0.06, 0.0, 0.06])
+def test_a_back_with_flanks_lies_straight_whichever_way_it_leans_or_looks(aside, angle):
+    chart, uv = pelt(aside)
+    c, s = np.cos(angle), np.sin(angle)
+    about_up = replace(chart, vertices=chart.vertices @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+    (found,) = turn_upright([about_up], [uv @ rotation(angle + 0.7)], [(0, 0, 1)])
+    along = (found - found.mean(axis=0)).T @ (uv - uv.mean(axis=0))
+    turn = np.arctan2(along[1, 0] - along[0, 1], along[0, 0] + along[1, 1])
+    assert abs(turn) < np.radians(2)
+    # What is the other way round in space is so in the map.
+    other = replace(chart, vertices=about_up.vertices * [-1, 1, 1])
+    (mirrored,) = turn_upright([other], [(uv @ rotation(angle + 0.7)) * [-1, 1]], [(0, 0, 1)])
+    assert np.allclose(mirrored, found * [-1, 1], atol=1e-9)

@@ -67,7 +67,7 @@ def test_a_half_and_its_image_are_the_surface_again_and_exactly_symmetric(name, 
     component, mirror = mirrored(bent(V, 3, amount), F)
     assert mirror.exact == (amount == 0)
     F, coarse = component.triangles, half_of(component, mirror).ended(200)
-    there, n = coarse.mirrored, len(coarse.kept)
+    there, n = coarse.images, len(coarse.kept)
     assert 100 < n < 260
     # Images go both ways, and are where they belong.
     own = there.image == np.arange(n)

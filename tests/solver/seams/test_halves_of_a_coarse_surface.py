@@ -25,7 +25,7 @@ def test_what_is_counted_has_its_image_on_the_other_side_or_in_the_plane(kept, s
              "other side": chance & ~side, "plane": plane}[kept]  # fmt: skip
     rows = np.flatnonzero(among)
     coarse = SimpleNamespace(
-        kept=rows, positions=points[rows], boundary=np.zeros(len(rows), bool), size=1.0, mirrored=None
+        kept=rows, positions=points[rows], boundary=np.zeros(len(rows), bool), size=1.0, images=None
     )
     mirror = SimpleNamespace(plane=plane, side=side, image=image)
     no_base, factor = np.zeros(len(component.pair), bool), np.ones(component.vertex_count)
