@@ -165,7 +165,7 @@ def _upward(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None) -> np
     """Direction (k,) in the map in which the islands rise in space; nan for those that do not rise anywhere."""
     area = signed_areas(islands.uv, islands.triangles)
     whole = np.maximum(np.bincount(islands.owner, np.abs(area), islands.count), np.finfo(float).tiny)
-    upward, rising, level = np.full(islands.count, np.nan), np.zeros(islands.count), []
+    upward, level = np.full(islands.count, np.nan), []
     # A wall rises by 1 per length where the map is as large as the surface.
     for k, axis in enumerate((up, *_level(up, viewers))):
         given = (islands.triangles, islands.owner, area)

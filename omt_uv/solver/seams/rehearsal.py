@@ -59,6 +59,7 @@ class Rehearsal:
 
     Attributes
     ----------
+    component : whose coarse surfaces they are
     log_density : half the logarithm of the density (c,) at the vertices of a coarse surface, or None
     sheared : gives the square of log(shear) of a small surface along its seams for such a density (n,), None where it
         has no map of its own; itself None where predictions have to do
