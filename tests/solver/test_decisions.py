@@ -16,7 +16,8 @@ from omt_uv.solver.mesh import charts
 from omt_uv.solver.parameterization import convex_maps, mirrored_charts, pieces, shear_search, small_charts
 from omt_uv.solver.remeshing.initial.options import STRATEGIES, RemeshOptions
 from omt_uv.solver.remeshing.relaxation import vertex_balance
-from omt_uv.solver.seams import path_graph, rehearsal
+from omt_uv.solver.seams import path_graph
+from omt_uv.solver.seams.coarse_surface import is_half
 from omt_uv.solver.transport import damped_newton
 
 # Just within a bound, and just beyond it.
@@ -236,9 +237,6 @@ def test_a_half_ends_in_the_plane_and_has_half_of_the_area(far):
     stretched = V.copy()
     right = V[:, 0] > middle
     stretched[right, 0] = middle + (V[right, 0] - middle) * (1 + 2.1 * far * 0.05)
-    coarse = SimpleNamespace(triangles=F, positions=stretched)
     plane = np.isclose(V[:, 0], middle)
-    assert rehearsal._is_half(coarse, half, plane) == (far < 1)
-    assert not rehearsal._is_half(coarse, half[1:], plane) and not rehearsal._is_half(
-        coarse, half, plane & (V[:, 1] > 0.5)
-    )
+    assert is_half(stretched, F, half, plane) == (far < 1)
+    assert not is_half(stretched, F, half[1:], plane) and not is_half(stretched, F, half, plane & (V[:, 1] > 0.5))

@@ -224,14 +224,11 @@ def half_coarsening(
     plane (n,) bool, image (n,), height (n,), normal (3,): see `HalfSurface`
     """
     n, outline = len(positions), boundary_edges(triangles)
-    half = triangles[((height >= 0) | plane)[triangles].all(axis=1)]
-    half = half[~plane[half].all(axis=1)]
-    half = _largest(half, n)
+    half = _largest(triangles[in_half(triangles, (height >= 0) | plane, plane)], n)
     border = boundary_edges(half)
-    outer = np.isin(pair_keys(*border.T), pair_keys(*outline.T))
     in_plane = plane[border].all(axis=1)
-    area, whole = (face_areas(positions, part).sum() for part in (half, triangles))
-    if not (outer ^ in_plane).all() or abs(2 * area - whole) > WHOLE * whole:
+    outer = np.isin(pair_keys(*border[in_plane].T), pair_keys(*outline.T))
+    if outer.any() or not is_half(positions, triangles, half, plane):
         return None
     # Not where two fans of the half meet in a vertex.
     if np.bincount(border[:, 0], minlength=1).max(initial=0) > 1:
@@ -252,6 +249,21 @@ def half_coarsening(
     begun = _begun(points, half, kind, on_boundary, curvature)
     begun = replace(begun, left=len(np.unique(half)))
     return HalfSurface(begun.towards(COMMON * count // 2, 0), line, image, height - above, normal)
+
+
+def in_half(triangles: np.ndarray, within: np.ndarray, plane: np.ndarray) -> np.ndarray:
+    """Triangles (t,) bool of one half, whose vertices within (n,) bool are on its side or in the plane (n,) bool; those
+    that lie in the plane are of none."""
+    return within[triangles].all(axis=1) & ~plane[triangles].all(axis=1)
+
+
+def is_half(positions: np.ndarray, triangles: np.ndarray, half: np.ndarray, plane: np.ndarray) -> bool:
+    """Whether some of the triangles (t,3), `half` (h,3), end in the plane (n,) bool or on the boundary, and have half
+    of the area."""
+    ends = boundary_edges(half)
+    outside = np.isin(pair_keys(*ends.T), pair_keys(*boundary_edges(triangles).T))
+    area, whole = (face_areas(positions, part).sum() for part in (half, triangles))
+    return bool((outside | plane[ends].all(axis=1)).all() and abs(2 * area - whole) <= WHOLE * whole)
 
 
 def _largest(triangles: np.ndarray, n: int) -> np.ndarray:

@@ -21,10 +21,10 @@ from ..errors import MeshError
 from ..mesh.edge_flips import flip_in_place
 from ..mesh.geometry import edge_lengths, face_areas
 from ..mesh.surface import Surface, triangle_surface
-from ..mesh.topology import across_edges, boundary_edges, halfedges, pair_keys, paired, twins
+from ..mesh.topology import across_edges, halfedges, pair_keys, paired, twins
 from ..progress import Steps, part_of
 from .coarse_cut import CoarseCut, best_of
-from .coarse_surface import WHOLE, CoarseSurface
+from .coarse_surface import CoarseSurface, in_half, is_half
 from .cut_tree import Cut, Task
 from .growth import EVEN, grow, grown_by_one
 from .improvement import MOST_REGROWN, rerouted, trimmed
@@ -194,9 +194,8 @@ def opened(found: CoarseCut, near_base: np.ndarray) -> OpenSurface:
         plane, side = found.mirror.plane[coarse.kept], found.mirror.side[coarse.kept]
         if coarse.images is not None:
             plane, side = graph.in_plane, coarse.images.side
-        half = coarse.triangles[(plane | side)[coarse.triangles].all(axis=1)]
-        half = half[~plane[half].all(axis=1)]
-        if _is_half(coarse, half, plane):
+        half = coarse.triangles[in_half(coarse.triangles, plane | side, plane)]
+        if is_half(coarse.positions, coarse.triangles, half, plane):
             here = np.zeros(len(plane), dtype=bool)
             here[half] = True
             half, seams = _along(coarse.positions, half, steps[here[steps].all(axis=1)])
@@ -218,14 +217,6 @@ def _without_loops(seams: np.ndarray, more: np.ndarray, boundary: np.ndarray) ->
     tree = minimum_spanning_tree(coo_matrix((weight, tuple(np.sort(ends, axis=1).T)), shape=(n + 1, n + 1)).tocsr())
     kept = pair_keys(*(x.astype(np.int64) for x in tree.nonzero()))
     return edges[first | np.isin(pair_keys(*ends.T), kept)]
-
-
-def _is_half(coarse: CoarseSurface, half: np.ndarray, plane: np.ndarray) -> bool:
-    """Whether triangles (t,3) end in the plane (c,) bool or on the boundary, and have half of the area."""
-    ends = boundary_edges(half)
-    outside = np.isin(pair_keys(*ends.T), pair_keys(*boundary_edges(coarse.triangles).T))
-    area, whole = (face_areas(coarse.positions, triangles).sum() for triangles in (half, coarse.triangles))
-    return bool((outside | plane[ends].all(axis=1)).all() and abs(2 * area - whole) <= WHOLE * whole)
 
 
 def _doubled(positions, half, seams, plane, height, normal) -> OpenSurface:

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..cutting.component import CutComponent, boundary_vertices
 from ..cutting.cut_graph import greedy_arcs, is_disk, shorten, stretches
 from ..mesh.topology import graph_components, pair_keys
+from .coarse_surface import in_half
 from .fine_paths import FineGraph, FineMirror, edges_along
 from .path_graph import path_to
 
@@ -105,7 +106,7 @@ def _by_halves(component: CutComponent, mirror: FineMirror) -> np.ndarray | None
     """What `symmetric_base` finds, handles or not: a cut of one half, its image, and all of the plane but
     the dearest piece between these."""
     within = mirror.side | mirror.plane
-    chosen = within[component.triangles].all(axis=1) & ~mirror.plane[component.triangles].all(axis=1)
+    chosen = in_half(component.triangles, within, mirror.plane)
     sides = chosen[component.pair // 3]
     border = sides.any(axis=1) & ~sides.all(axis=1)
     half, vertices = _part(component, chosen)

@@ -307,12 +307,11 @@ def test_seams_close_no_loops_with_their_images_and_the_boundary_is_one_vertex()
 def test_halves_end_in_the_plane_and_have_half_of_the_area():
     V, F = meshes.two_bumps(6)
     plane = np.abs(V[:, 0] - 0.5) < 1e-9
-    coarse = SimpleNamespace(positions=V, triangles=F)
     half = F[(V[F][:, :, 0] <= 0.5 + 1e-9).all(axis=1)]
-    assert rehearsal._is_half(coarse, half, plane)
-    assert not rehearsal._is_half(coarse, half, np.zeros(len(V), bool))
-    assert not rehearsal._is_half(coarse, half[2:], plane)
-    assert not rehearsal._is_half(coarse, F, plane)
+    assert coarse_surface.is_half(V, F, half, plane)
+    assert not coarse_surface.is_half(V, F, half, np.zeros(len(V), bool))
+    assert not coarse_surface.is_half(V, F, half[2:], plane)
+    assert not coarse_surface.is_half(V, F, F, plane)
     height, normal = V[:, 0] - 0.5, np.array([1.0, 0, 0])
     seams = np.array([half[0][:2]])
     found = rehearsal._doubled(V, half, seams, plane, height, normal)
