@@ -34,7 +34,8 @@ def located(error: MeshError, chart: Chart) -> MeshError:
     elements = error.elements
     if place is not None:
         elements = place[elements]
-        elements = elements[(elements >= 0).reshape(len(elements), -1).all(axis=1)]
+        there = elements >= 0
+        elements = elements[there.all(axis=1) if there.ndim > 1 else there]
         # A polygon has several triangles that something may be wrong with.
         elements = np.unique(elements) if error.kind == "face" else elements
     return type(error)(error.cause, error.remedy, error.kind, elements)
