@@ -12,6 +12,8 @@ from ..selection import read_file
 
 # The ball around everything is so much larger, or nothing on it could move.
 ROOM = 1.1
+# What `--inside` calls that ball.
+BALL = "ball"
 
 
 def add(commands) -> None:
@@ -57,7 +59,8 @@ def run_flow(options: argparse.Namespace) -> None:
     check_paths(options)
     file = read_handle_file(options.handles)
     everything = [obj for obj, _ in read_file(options)]
-    objects = [obj for obj in everything if obj.name != options.inside]
+    # A body may be called as the ball around all is.
+    objects = [obj for obj in everything if options.inside == BALL or obj.name != options.inside]
     if not objects:
         raise CommandError(f"{options.input}: only the wall {options.inside} is there, and nothing that could flow.")
     with refusals(name=objects[0].name if len(objects) == 1 else str(options.input)):
@@ -99,7 +102,7 @@ def _domain(options: argparse.Namespace, bodies):
     """The walls that `--inside` names."""
     if not options.inside:
         return None
-    if options.inside != "ball":
+    if options.inside != BALL:
         from ...blender.volumes.flow_handles import wall_of
 
         return wall_of("mesh", options.inside)

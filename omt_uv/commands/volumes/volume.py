@@ -51,7 +51,9 @@ def run_volume(options: argparse.Namespace) -> None:
             f"{options.input}: there is no mesh {options.domain!r} to map to. Give ball, cube or its name."
         )
     mine = [obj for obj in objects if obj is not goal]
-    if len(mine) != 1 and suffix != ".blend":
+    if not mine:
+        raise CommandError(f"{options.input}: only {options.domain} is there, and nothing that could be mapped to it.")
+    if len(mine) > 1 and suffix != ".blend":
         raise CommandError(
             f"{options.input}: has {len(mine)} meshes to map. Choose one by --object, or write a .blend."
         )
