@@ -24,9 +24,11 @@ def inside(plots, picture, row, column):
     return picture[at[0], at[1]]
 
 
-def test_cells_are_as_light_as_they_are_far_and_unknown_ones_have_a_colour(plots):
-    values = distances()
-    values[0, 3] = np.nan
+@pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("factor", [1e-300, 1.0, 1e300])
+def test_cells_are_as_light_as_they_are_far_and_unknown_ones_have_a_colour(plots, unknown, factor):
+    values = factor * distances()
+    values[0, 3] = unknown
     picture = plots.matrix_picture(values)
     for i in range(4):
         for j in range(4):
@@ -34,7 +36,7 @@ def test_cells_are_as_light_as_they_are_far_and_unknown_ones_have_a_colour(plots
             if (i, j) == (0, 3):
                 assert np.ptp(colour) > 0.05
             else:
-                np.testing.assert_allclose(colour, values[i, j] / np.nanmax(values), atol=1e-6)
+                np.testing.assert_allclose(colour, distances()[i, j] / distances().max(), atol=1e-6)
     # Rows of one class stand together: 0, 2, 1, 3.
     sorted_ = plots.matrix_picture(distances(), ["even", "odd", "even", "odd"])
     for (i, j), (a, b) in {(0, 1): (0, 2), (1, 2): (2, 1), (3, 0): (3, 0)}.items():

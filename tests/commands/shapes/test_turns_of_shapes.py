@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -186,8 +187,9 @@ def test_what_is_no_block_is_refused(distances, package, tmp_path, text):
 @pytest.mark.parametrize("jobs", [0, 2])
 @pytest.mark.parametrize("known", [[], ["one.obj"], ["one.obj", "two.obj"]])
 @pytest.mark.parametrize("bad", [[], ["two.obj"], ["one.obj", "two.obj"]])
-def test_only_what_is_new_in_a_folder_gets_a_signature(
-    library, package, tmp_path, monkeypatch, capsys, jobs, known, bad
+@pytest.mark.parametrize("since", ["as it was", "longer", "newer"])
+def test_only_what_is_new_in_a_folder_or_has_changed_gets_a_signature(
+    library, package, tmp_path, monkeypatch, capsys, jobs, known, bad, since
 ):
     folder, module = tmp_path / "meshes", package("pipelines.shapes.signature_index")
     folder.mkdir()
@@ -211,8 +213,16 @@ def test_only_what_is_new_in_a_folder_gets_a_signature(
         output.write_bytes(old.bytes())
     monkeypatch.setattr(module, "read_index", lambda path: old)
     monkeypatch.setattr(
-        module, "index_of", lambda new, old=None: Held([*(old.names if old else ()), *new]) if new or old else None
+        module,
+        "index_of",
+        lambda new, old=None: Held(dict.fromkeys([*(old.names if old else ()), *new])) if new or old else None,
     )
+    changed = known[:1] if since != "as it was" else []
+    for name in changed:
+        if since == "longer":
+            (folder / name).write_text("v 0 0 0\nv 1 0 0\n")
+        else:
+            os.utime(folder / name, ns=(0, (folder / name).stat().st_mtime_ns + 1000))
     tried, told = [], []
 
     def signature(options, path):
@@ -228,7 +238,7 @@ def test_only_what_is_new_in_a_folder_gets_a_signature(
         input=folder, output=output, markers=None, jobs=jobs, scheduler=None, report=None, points=100, object=[],
         scene="", skip_linked=False, strict=False, timeout=0.0, memory=0.0,
     )  # fmt: skip
-    due = [n for n in ("one.obj", "two.obj") if n not in known]
+    due = [n for n in ("one.obj", "two.obj") if n not in known or n in changed]
     new = [n for n in due if n not in bad]
     if not new and not known:
         with pytest.raises(common.CommandError, match="none of its 2 mesh files"):
@@ -236,8 +246,9 @@ def test_only_what_is_new_in_a_folder_gets_a_signature(
         return
     library.run(options)
     assert tried == ([] if jobs else due) and len(told) == (0 if jobs else len(set(due) & set(bad)))
-    assert output.read_bytes().decode() == ",".join(sorted([*known, *new]))
-    assert capsys.readouterr().out.startswith(f"{len(new)} new, {len(known) + len(new)} in ")
+    every = sorted({*known, *new})
+    assert output.read_bytes().decode() == ",".join(every)
+    assert capsys.readouterr().out.startswith(f"{len(new)} new, {len(every)} in ")
 
 
 @pytest.mark.parametrize("begin", ["", "{path}: ", "{path.name}: "])

@@ -213,6 +213,45 @@ def test_accessors_that_lie_are_refused_by_what_is_wrong(text):
         glb_data.accessor(glb, 0)
 
 
+# What leads to the last byte or value that is there, and `more` beyond it, and what is wrong then.
+ENDS = {
+    "offset of values": (lambda doc, more: doc["accessors"][0].update(byteOffset=56 + more), "leads out of"),
+    "offset of a view": (lambda doc, more: doc["bufferViews"][0].update(byteOffset=56 + more), "leads out of"),
+    "stride": (lambda doc, more: doc["bufferViews"][0].update(byteStride=60 + more), "leads out of"),
+    "count": (lambda doc, more: doc["accessors"][0].update(count=16 + more), "leads out of"),
+    "count of new ones": (lambda doc, more: doc["accessors"][0]["sparse"].update(count=2 + more), "does not have"),
+    "offset of new ones": (
+        lambda doc, more: doc["accessors"][0]["sparse"]["values"].update(byteOffset=60 + more),
+        "leads out of",
+    ),
+    "offset of their places": (
+        lambda doc, more: doc["accessors"][0]["sparse"]["indices"].update(byteOffset=60 + more),
+        "leads out of",
+    ),
+    "place of a new one": (lambda doc, more: doc.update(place=1 + more), "does not have"),
+}
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_the_last_byte_and_the_last_value_are_read_and_none_beyond(end):
+    change, text = ENDS[end]
+    for more in (-1, 0, 1, 2):
+        doc = {
+            "buffers": [{"byteLength": 64}],
+            "bufferViews": [{"buffer": 0, "byteLength": 64}, {"buffer": 0, "byteLength": 64}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR"}],
+        }
+        places = {"bufferView": 1, "componentType": 5125}
+        doc["accessors"][0]["sparse"] = {"count": 1, "indices": places, "values": {"bufferView": 1}}
+        change(doc, more)
+        glb = glb_data.Glb(doc, int(doc.get("place", 0)).to_bytes(4, "little") + bytes(60), [])
+        if more <= 0:
+            assert len(glb_data.accessor(glb, 0)) == doc["accessors"][0]["count"]
+            continue
+        with pytest.raises(InPlaceError, match=text):
+            glb_data.accessor(glb, 0)
+
+
 @pytest.mark.parametrize("other", ["TEXCOORD_1", "_MINE"])
 def test_where_two_attributes_are_one_accessor_the_other_one_keeps_its_values(tmp_path, other):
     data, raw = gltf_parts()

@@ -111,3 +111,18 @@ def test_overlap_exceeds_bounds_where_it_is_above_any_of_them(shift):
         above = any(overlap_share(uv, samples=samples) > share for samples, share in bounds)
         assert overlap_exceeds(uv, bounds) == above
     assert overlap_exceeds(uv, [(4000, 0.0)]) == (shift < 0.9995)
+
+
+@pytest.mark.parametrize("points", [0.9, 1.05, 1.5, 1.9, 4.0])
+def test_what_more_than_a_point_stands_for_is_found_on_average_and_what_less_does_never(points):
+    """Two triangles that look at one another, over which so many of the samples lie."""
+    samples, seeds = 2000, 60
+    # w - 3/4 w^2 is what they have in common where they overlap by w, of an area of 1/2 each; a point of it is of both.
+    w = points / (2 * samples)
+    left = np.array([[0.0, 0.5], [1.0, 0.0], [1.0, 1.0]])
+    uv = np.stack([left, left * [-1, 1] + [2 - w, 0]])
+    found = [overlap_share(uv, samples=samples, seed=seed) * samples for seed in range(seeds)]
+    if points < 1:
+        assert not any(found)
+    else:
+        assert np.mean(found) == pytest.approx(points, abs=4 * np.sqrt(points / seeds))

@@ -69,6 +69,30 @@ def test_every_cell_has_its_area_and_the_cut_mesh_is_the_surface(name):
     assert np.allclose(of_cell, division.asked, rtol=2e-4)
 
 
+# Corners of a further triangle that is a line or a point, of those of the first one.
+LINES = {"one edge there and back": (0, 1, 0), "two corners in one": (1, 1, 2), "a point": (2, 2, 2)}
+
+
+@pytest.mark.parametrize("line", LINES)
+@pytest.mark.parametrize("name", ["square of two triangles", "plane", "rod", "one cell"])
+def test_triangles_without_area_stay_out_of_the_cut_mesh(name, line):
+    make, count = SURFACES[name]
+    V, F = make()
+    first = len(F) // 2
+    G = np.concatenate([F[:first], F[:1, list(LINES[line])], F[first:]])
+    mesh = cut_along_cells(V, G, drain(divide(V, G, count)))
+    size, corners = np.diff(mesh.face_start), mesh.face_start[-1]
+    assert (
+        size.min() >= 3 and first not in mesh.triangle and set(np.unique(mesh.triangle)) == {*range(len(G))} - {first}
+    )
+    assert {len(mesh.corner_vertex), len(mesh.barycentric), len(mesh.halfedge)} == {corners}
+    # Every corner lies where its triangle and its barycentric coordinates say.
+    of = G[np.repeat(mesh.triangle, size)]
+    np.testing.assert_allclose(
+        mesh.positions[mesh.corner_vertex], np.einsum("kc,kcd->kd", mesh.barycentric, V[of]), atol=1e-9
+    )
+
+
 def lengths(positions, edges):
     return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1).sum()
 
