@@ -89,7 +89,7 @@ def _large(is_far=False, **options):
 def _far():
     """Areas far from the surface's come by conformal map and transport."""
     V, F = patch()
-    return omt.unwrap(V, F, boundary="disk", density=1 + 20 * near_middle(V, F) ** 4)
+    return omt.unwrap(V, F, boundary="disk", density=(1 + 20 * near_middle(V, F) ** 4)[: len(F)])
 
 
 def _pinned():

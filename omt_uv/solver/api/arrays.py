@@ -45,8 +45,38 @@ def polygon_surface(vertices: np.ndarray, faces: Faces, seams=()) -> Surface:
     second = np.arange(len(owner)) - (np.cumsum(sides - 2) - (sides - 2))[owner] + 1
     first = start[owner]
     triangles = np.stack([first, first + second, first + second + 1], axis=1)
-    seams = np.asarray(seams, np.int64).reshape(-1, 2)
+    seams = pairs_of(seams, len(vertices), "seams")
     return Surface(vertices, corner_vertex, start, triangles, owner, seams)
+
+
+def pairs_of(edges, count: int, name: str) -> np.ndarray:
+    """Pairs (k,2) of vertices of so many; `name` is that of the argument, for the error."""
+    pairs = np.asarray(edges, np.int64).reshape(-1, 2)
+    if len(pairs) and not (pairs.min() >= 0 and pairs.max() < count):
+        raise ValueError(f"{name} name vertices that are not among the {count} given")
+    return pairs
+
+
+def of_faces(values, surface: Surface, name: str) -> np.ndarray:
+    """Numbers (f,) of the polygons of a surface."""
+    return _one_each(values, len(surface.face_start) - 1, name, "faces")
+
+
+def of_vertices(values, surface: Surface, name: str) -> np.ndarray:
+    """Numbers (n,) of the vertices of a surface."""
+    return _one_each(values, len(surface.positions), name, "vertices")
+
+
+def marked_corners(marks, surface: Surface, name: str) -> np.ndarray:
+    """Which corners (c,) of a surface are marked."""
+    return _one_each(marks, len(surface.corner_vertex), name, "corners", bool)
+
+
+def _one_each(values, count: int, name: str, what: str, kind: type = float) -> np.ndarray:
+    found: np.ndarray = np.asarray(values, kind)
+    if found.shape != (count,):
+        raise ValueError(f"{name} must have the shape ({count},), one for each of the {what}, not {found.shape}")
+    return found
 
 
 def to_corners(uv: np.ndarray, surface: Surface) -> np.ndarray:

@@ -26,7 +26,16 @@ from ..progress import Steps, part_of
 from ..remeshing import Remesh
 from ..sphere import sphere_map as spheres
 from ..sphere.sphere_map import SphereMap
-from .arrays import Faces, from_corners, polygon_surface, to_corners
+from .arrays import (
+    Faces,
+    from_corners,
+    marked_corners,
+    of_faces,
+    of_vertices,
+    pairs_of,
+    polygon_surface,
+    to_corners,
+)
 from .results import MagnifiedUVs, UVs
 
 # Room between islands that are laid side by side, over the side of a square of the same area.
@@ -38,8 +47,10 @@ def unwrap(
 ) -> Steps[UVs]:
     """Unwrap polygons step by step, see `functions.unwrap`."""
     surface = polygon_surface(vertices, faces, seams)
-    corner_pins = None if pins is None else CornerPins(np.asarray(pins[0], bool), to_corners(pins[1], surface))
-    target = None if density is None else Target(np.asarray(density, float)[surface.triangle_face], None)
+    corner_pins = None
+    if pins is not None:
+        corner_pins = CornerPins(marked_corners(pins[0], surface, "pins"), to_corners(pins[1], surface))
+    target = None if density is None else Target(of_faces(density, surface, "density")[surface.triangle_face], None)
     found = yield from unwrapping.unwrap(
         surface, options=UnwrapOptions(seams=cuts, **options), pins=corner_pins, target=target
     )
@@ -96,7 +107,7 @@ def magnify(
     """Magnify a painted region of existing UVs step by step, see `functions.magnify`."""
     surface = polygon_surface(vertices, faces)
     corner_uv = to_corners(uv, surface).copy()
-    painted = means_of_corners(np.asarray(weights, float), surface.corner_vertex, surface.face_start)
+    painted = means_of_corners(of_vertices(weights, surface, "weights"), surface.corner_vertex, surface.face_start)
     painted = painted[surface.triangle_face]
     before = np.abs(signed_areas(corner_uv, surface.triangles))
     asked = target_density(painted, before, factor, options.get("exact", True))
@@ -126,7 +137,7 @@ def sphere_map(vertices: np.ndarray, faces: Faces, **options) -> Steps[SphereMap
     surface = polygon_surface(vertices, faces)
     density = options.pop("density", None)
     if density is not None:
-        density = np.asarray(density, float)[surface.triangle_face]
+        density = of_faces(density, surface, "density")[surface.triangle_face]
     triangles = surface.corner_vertex[surface.triangles]
     options["polygons"] = surface.triangle_face
     return (yield from spheres.sphere_map(surface.positions, triangles, density, **options))
@@ -137,7 +148,9 @@ def remesh(vertices: np.ndarray, faces: Faces, count: int, **options) -> Steps[R
     surface = polygon_surface(vertices, faces)
     density, features = options.pop("density", None), options.pop("features", None)
     if density is not None:
-        density = np.asarray(density, float)[surface.triangle_face]
+        density = of_faces(density, surface, "density")[surface.triangle_face]
+    if features is not None:
+        features = pairs_of(features, len(surface.positions), "features")
     source = remeshing.RemeshSource(surface.positions, surface.corner_vertex[surface.triangles], features)
     return (yield from remeshing.remesh(source, count, remeshing.RemeshOptions(**options), density))
 
