@@ -42,6 +42,9 @@ def vertex_score(
     if not len(triangles):
         raise EmptyMeshError("There are no faces to weigh", "Add some faces")
     check_finite(positions, triangles)
+    # Vertices of no face may be anywhere, or nowhere.
+    nowhere = ~np.isfinite(positions).all(axis=1)
+    positions = np.where(nowhere[:, None], positions[triangles[0, 0]], positions) if nowhere.any() else positions
     if kind == "saliency":
         found = saliency(positions, triangles)
         means = HeatMeans(unit_size(positions, triangles), triangles, SMOOTH_SALIENCY)

@@ -73,3 +73,29 @@ def test_scaled_areas_are_areas_at_any_scale():
     area = scaled_vertex_areas(V, F)
     np.testing.assert_allclose(area / area.sum(), vertex_areas(V, F) / vertex_areas(V, F).sum(), rtol=1e-12)
     np.testing.assert_allclose(scaled_vertex_areas(1e200 * V, F), area, rtol=1e-9)
+
+
+@pytest.mark.parametrize("invert", [False, True])
+@pytest.mark.parametrize("low_high", [(0.0, 1.0), (0.0, 0.5), (0.4, 0.8), (0.8, 0.98), (0.5, 1.0)])
+@pytest.mark.parametrize("score", [0.0, -1e6, 1e6, np.nan, np.inf])
+def test_vertices_of_no_face_play_no_part_in_weights(score, low_high, invert):
+    rng = np.random.default_rng(2)
+    for values in (rng.normal(size=60), np.round(rng.normal(size=60)), np.repeat([0.0, 1.0], [59, 1])):
+        area, loose = rng.uniform(0.5, 2, 60), rng.permutation(80) < 20
+        more, place = np.full(80, score), np.zeros(80)
+        more[~loose], place[~loose] = values, area
+        found = soft_weights(more, place, *low_high, invert)
+        np.testing.assert_array_equal(found[~loose], soft_weights(values, area, *low_high, invert))
+        assert np.isfinite(found).all() and found.min() >= 0 and found.max() <= 1
+        # Where all that has an area is alike, what has none makes no difference.
+        with pytest.raises(WeightError, match="same everywhere"):
+            soft_weights(np.where(loose, more, 3.0), place, *low_high, invert)
+
+
+@pytest.mark.parametrize("kind", ["saliency", "gaussian", "mean", "sharpness", "distance"])
+def test_vertices_of_no_face_play_no_part_in_scores(kind):
+    V, F, _ = meshes.single_bump(12)
+    far = np.array([[9.0, -7.0, 80.0], [0.1, 0.1, 0.1], [np.nan, 0.0, np.inf]])
+    chosen = np.arange(len(V)) == 5
+    found = vertex_score(kind, np.concatenate([V, far]), F, np.append(chosen, [True] * 3))
+    np.testing.assert_allclose(found[: len(V)], vertex_score(kind, V, F, chosen), rtol=1e-8, atol=1e-10)
