@@ -27,6 +27,13 @@ def mesh(tmp_path):
 # The words of a command beside its file, its status, and what it says.
 REFUSED = {
     "a table of no regions": (["measure", "IN", "--csv"], 2, "Name these by --regions"),
+    "a shape key of no strain": (["measure", "IN", "--shape-key", "Key"], 2, "goes with --beltrami"),
+    "regions beside those of strain": (
+        ["measure", "IN", "--beltrami", "--regions", "materials"], 2, "has regions of its own"),
+    "a shape key of no compared strain": (
+        ["compare", "IN", "OTHER", "--shape-key", "Key"], 2, "goes with --beltrami"),
+    **{f"{words[0]} of strain": (["compare", "IN", "OTHER", "--beltrami", *words], 2, "--beltrami has not")
+       for words in (["--plot", "p.png"], ["--csv"], ["--samples", "100"])},
     "a histogram that is none": (["measure", "IN", "--histogram", "h.gif"], 1, "Name a .png file"),
     "attributes elsewhere": (["measure", "IN", "--attributes", "a.obj"], 1, "only .blend files keep"),
     "a layer that is not there": (["refine", "IN", "-o", "o.blend", "--uv-layer", "none"], 1, "no UV map 'none'"),
@@ -61,8 +68,11 @@ REFUSED = {
 def test_what_does_not_go_together_is_refused_by_what_is_wrong(run, mesh, monkeypatch, name):
     words, status, said = REFUSED[name]
     monkeypatch.chdir(mesh.parent)
+    files = {"IN": str(mesh), "OTHER": str(mesh.with_name("other.blend"))}
+    if "OTHER" in words:
+        mesh.with_name("other.blend").write_bytes(mesh.read_bytes())
     before = {path: path.read_bytes() for path in mesh.parent.iterdir()}
-    found, _, err = run(*[str(mesh) if word == "IN" else word for word in words])
+    found, _, err = run(*[files.get(word, word) for word in words])
     assert found == status and said in err and len(err.strip().splitlines()) == 1, err
     assert {path: path.read_bytes() for path in mesh.parent.iterdir()} == before
 

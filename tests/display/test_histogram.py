@@ -49,6 +49,20 @@ def test_a_thumbnail_is_transparent_but_for_its_bars():
     assert 0.02 < picture[..., 3].mean() < 0.9
 
 
+@pytest.mark.parametrize("size", [96, 97, 128, 256])
+def test_both_halves_of_a_thumbnail_have_bars_above_a_scale_and_room_around_each(size):
+    drawn = thumbnail([bump()], size)[..., 3] > 0
+    half, thick = size // 2, size // 24
+    for top in (0, half):
+        part = drawn[top : top + half]
+        rows = np.flatnonzero(part.any(axis=1))
+        assert rows[0] == thick and rows[-1] == half - 1 - thick, "room above and below"
+        # The scale is as wide as the picture, and below the bars, which have gaps.
+        scale = np.flatnonzero(part.all(axis=1))
+        assert len(scale) == 2 * thick - thick // 2 and (np.diff(scale) == 1).all() and scale[-1] == rows[-1]
+        assert not part[scale[0] - thick // 2 : scale[0]].any() and part[scale[0] - thick // 2 - 1].any()
+
+
 def test_nothing_to_draw_is_an_error():
     with pytest.raises(EmptyMeshError):
         histogram([reading(*meshes.grid(2, 2))])

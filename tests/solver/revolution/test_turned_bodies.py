@@ -14,7 +14,7 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.revolution.axis import PASSES, axis_of_revolution
-from omt_uv.solver.revolution.bands import CREASE, ISLAND, WORTH, cheapest_bands
+from omt_uv.solver.revolution.bands import CREASE, ISLAND, WORTH, bands_and_cost, cheapest_bands
 from omt_uv.solver.revolution.profile import LEAST_SIDES, MOST_LEVELS, Profile, profile_of
 
 # Distances from the axis, and heights.
@@ -206,7 +206,10 @@ def test_the_cheapest_of_all_choices_is_found():
         return total
 
     every = [tuple(1 + np.flatnonzero([n >> k & 1 for k in range(6)])) for n in range(64)]
-    assert tuple(cheapest_bands(given, price, ASKED)) == min(every, key=cost)
+    best = min(every, key=cost)
+    assert tuple(cheapest_bands(given, price, ASKED)) == best
+    levels, least = bands_and_cost(given, price, ASKED)
+    assert tuple(levels) == best and least == pytest.approx(cost(best), rel=1e-9)
 
 
 def test_rings_are_whole_rows_of_edges():
