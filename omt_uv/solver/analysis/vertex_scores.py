@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..errors import EmptyMeshError, NoSelectionError, WeightError
 from ..mesh.geometry import vertex_areas
-from ..mesh.surface import check_finite
+from ..mesh.surface import with_loose_placed
 from ..mesh.topology import halfedges, pair_keys, pair_up, previous_halfedge
 from . import curvature
 from .heat_means import HeatMeans
@@ -41,10 +41,7 @@ def vertex_score(
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     if not len(triangles):
         raise EmptyMeshError("There are no faces to weigh", "Add some faces")
-    check_finite(positions, triangles)
-    # Vertices of no face may be anywhere, or nowhere.
-    nowhere = ~np.isfinite(positions).all(axis=1)
-    positions = np.where(nowhere[:, None], positions[triangles[0, 0]], positions) if nowhere.any() else positions
+    positions = with_loose_placed(positions, triangles)
     if kind == "saliency":
         found = saliency(positions, triangles)
         means = HeatMeans(unit_size(positions, triangles), triangles, SMOOTH_SALIENCY)

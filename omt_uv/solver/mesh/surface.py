@@ -97,6 +97,13 @@ def check_finite(positions: np.ndarray, triangles: np.ndarray) -> None:
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
 
 
+def with_loose_placed(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Positions (n,3), with vertices of no triangle (m,3) that are nowhere upon one of the mesh; see `check_finite`."""
+    check_finite(positions, triangles)
+    nowhere = ~np.isfinite(positions).all(axis=1)
+    return np.where(nowhere[:, None], positions[triangles[0, 0]], positions) if nowhere.any() else positions
+
+
 def degenerate_triangles(
     positions: np.ndarray, triangles: np.ndarray, flat: float = DEGENERATE, owner: np.ndarray | None = None
 ) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import CountError, EmptyMeshError, positive_density
 from ..mesh.geometry import face_areas
-from ..mesh.surface import check_finite
+from ..mesh.surface import with_loose_placed
 from ..progress import Progress, Steps, part_of
 from ..transport.damped_newton import DualSolution, solve_dual
 from .cells import DivisionProblem, GeodesicCells, GeodesicDual
@@ -90,7 +90,7 @@ def divide(
         raise CountError(f"{count} cells are none", "Ask for one cell or more")
     if not len(triangles):
         raise EmptyMeshError("There are no faces to divide")
-    check_finite(positions, triangles)
+    positions = with_loose_placed(positions, triangles)
     yield Progress("Sites", 0.0)
     scale = float(np.ptp(positions[np.unique(triangles)], axis=0).max()) or 1.0
     problem, counts = _problem(positions / scale, triangles, count, density)

@@ -11,17 +11,17 @@ import pytest
 import scenes
 from bodies import icosphere
 
-NAMES = ("Body", "ball", "cube", "free")
+NAMES = ("Body", "ball", "cube")
 # What each command is called with, but for its files; {name} is that of the mesh.
 WORDS = {
     "flow": ("--handles", "{folder}/h.json", "--inside", "ball"),
-    "volume": ("--tets", "300", "--domain", "ball"),
-    "volume in a cube": ("--tets", "300", "--domain", "cube"),
+    "volume": ("--tets", "100", "--domain", "ball"),
+    "volume in a cube": ("--tets", "100", "--domain", "cube"),
 }
 # What names the mesh itself.
 GOALS = {
     "flow": ("--handles", "{folder}/h.json", "--inside", "Body"),
-    "volume": ("--tets", "300", "--domain", "Body"),
+    "volume": ("--tets", "100", "--domain", "Body"),
 }
 
 

@@ -74,7 +74,7 @@ LINES = {"one edge there and back": (0, 1, 0), "two corners in one": (1, 1, 2), 
 
 
 @pytest.mark.parametrize("line", LINES)
-@pytest.mark.parametrize("name", ["square of two triangles", "plane", "rod", "one cell"])
+@pytest.mark.parametrize("name", ["plane", "rod", "one cell"])
 def test_triangles_without_area_stay_out_of_the_cut_mesh(name, line):
     make, count = SURFACES[name]
     V, F = make()
