@@ -194,11 +194,15 @@ def _picture(options: argparse.Namespace):
     if options.source != "uv":
         raise CommandError("A picture can only follow UVs that exist. Use --source uv.")
     from ..files import images
+    from ..solver.counts import check_pixels
 
     try:
         images.check_target(options.image_output)
         image = images.load(options.image)
-        return images.pixels_of(image), images.has_straight_alpha(image), _insets(options)
+        pixels, insets = images.pixels_of(image), _insets(options)
+        with refusals():
+            check_pixels(*_size(options, pixels))
+        return pixels, images.has_straight_alpha(image), insets
     except images.ImageError as error:
         raise CommandError(str(error)) from error
 
@@ -227,11 +231,14 @@ def _warped(options: argparse.Namespace, picture, regions, result):
     pixels, straight, insets = picture
     if not insets and not options.image_size:
         return warped_picture(pixels, regions, result, options.margin, straight)
+    return detailed_picture(pixels, regions, result, insets, _size(options, pixels), options.margin)
+
+
+def _size(options: argparse.Namespace, pixels) -> tuple[int, int]:
+    """Rows and columns of the picture of the new UVs."""
     height, width = pixels.shape[:2]
     wide = options.image_size or width
-    return detailed_picture(
-        pixels, regions, result, insets, (max(1, round(height * wide / width)), wide), options.margin
-    )
+    return max(1, round(height * wide / width)), wide
 
 
 def _write_picture(options: argparse.Namespace, picture) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,6 +20,7 @@ from ..solver.analysis.feature_edges import edge_union, resolved_features
 from ..solver.analysis.occlusion import hidden_sides, looks_out
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.contact.self_intersections import intersecting_pairs
+from ..solver.counts import BYTES_PER_VERTEX, check_memory
 from ..solver.errors import CountError, DensityError, MeshError, plural, reaching
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import Gluing, orientations
@@ -31,8 +31,6 @@ from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing import Remesh, RemeshOptions, RemeshSource, remesh
 from ..solver.transfer.correspondence import Correspondence, correspond
 
-# What a vertex of a new mesh takes at least while it is made: 13 kB between 10,000 and 40,000 vertices.
-BYTES_PER_VERTEX = 10_000
 # Share of the work on one level that its mesh takes; the rest is where it lies on the surface.
 REMESHING = 0.95
 ODD = " joined the wrong way round to others that look outwards, too"
@@ -153,15 +151,7 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
 
 def _check_memory(vertex_count: float) -> None:
     """Raise CountError for so many vertices that this machine cannot hold them."""
-    if not hasattr(os, "sysconf"):
-        return
-    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    if not vertex_count * BYTES_PER_VERTEX <= there:
-        raise CountError(
-            f"A mesh of about {vertex_count:.3g} vertices takes more memory to make than the {there / 1e9:.3g} GB "
-            "of this machine",
-            "Ask for fewer, or for longer edges",
-        )
+    check_memory(vertex_count, BYTES_PER_VERTEX, "A mesh of about {} vertices", "Ask for fewer, or for longer edges")
 
 
 def _features(

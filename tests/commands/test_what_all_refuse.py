@@ -234,6 +234,11 @@ SOME = {
     "measure @in.blend --beltrami --regions groups": "Leave --regions out",
     "distance @two.blend @in.blend --markers 0,1": "Choose it by --object",
     "distance @in.blend @other.blend --markers 0,900": "no vertex 900",
+    "test-texture @in.blend -o #out.png --size 900000": "picture of 3.24e+12 pixels takes more memory",
+    "test-texture @in.blend -o #out.png --size 900000 --kind area": "picture of 3.24e+12 pixels takes more memory",
+    "diagram @in.blend -o #out.png --size 900000": "picture of 3.24e+12 pixels takes more memory",
+    "magnify @in.blend -o #out.blend --weights region --factor 1.5 --source uv --image @image.png "
+    "--image-output #out.png --image-size 900000": "pixels takes more memory",
 }  # fmt: skip
 
 

@@ -46,7 +46,9 @@ def run(options: argparse.Namespace) -> None:
     if ending == ".png":
         from ...display.textures.layouts import cells_picture
 
-        write_picture(options.made, cells_picture(found, options.size))
+        with refusals(name=obj.name):
+            picture = cells_picture(found, options.size)
+        write_picture(options.made, picture)
     else:
         write_bytes(options.made, obj_text(*found.mesh()).encode())
     if options.json:

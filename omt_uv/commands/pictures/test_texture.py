@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..common import CommandError, blaming, check_paths, place_objects, require_blender, write_picture
+from ..common import CommandError, blaming, check_paths, place_objects, refusals, require_blender, write_picture
 from ..options import add_input, texture_size
 from ..selection import read_file
 
@@ -41,12 +41,13 @@ def drawn(options: argparse.Namespace):
     if options.kind in PATTERNS:
         from ...display.textures.patterns import picture_of
 
-        return picture_of(options.kind, options.size)
+        with refusals():
+            return picture_of(options.kind, options.size)
     from ...display.textures.layouts import layout_picture
 
     pairs = read_file(options)
     bare = [obj.name for obj, reading in pairs if reading.uv is None]
     if bare:
         raise CommandError(f"{', '.join(bare)}: There are no UVs to draw. Unwrap the mesh first.")
-    with blaming(pairs):
+    with refusals(), blaming(pairs):
         return layout_picture(place_objects(options, pairs), options.kind, options.size)

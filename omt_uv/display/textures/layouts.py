@@ -8,6 +8,7 @@ import numpy as np
 
 from ...pipelines.distortion import triangles_of
 from ...pipelines.measuring.diagrams import Diagram
+from ...solver.counts import check_pixels
 from ...solver.maps.distortion import face_distortion
 from ..colormaps import area_colours, cell_colours, shear_colours
 from ..preview import Placed
@@ -30,8 +31,10 @@ def layout_picture(objects: Sequence[Placed], kind: str, size: int) -> np.ndarra
 
     Raises
     ------
-    MeshError : there is no face, or, but for normals, see `solver.maps.distortion.distortion`
+    MeshError : there is no face, more pixels than this machine has memory for, or, but for normals, see
+        `solver.maps.distortion.distortion`
     """
+    check_pixels(size * SAMPLES)
     found = triangles_of([item.reading for item in objects])
     if kind == "normals":
         colours = np.concatenate([_lit_faces(item) for item in objects])
@@ -47,7 +50,9 @@ def layout_picture(objects: Sequence[Placed], kind: str, size: int) -> np.ndarra
 
 
 def cells_picture(diagram: Diagram, size: int) -> np.ndarray:
-    """The cells (size,size,3) in [0,1], top row first, in tints with their sides; of the sphere the half in front."""
+    """The cells (size,size,3) in [0,1], top row first, in tints with their sides; of the sphere the half in front.
+    Raises CountError for more than this machine has memory for."""
+    check_pixels(size * SAMPLES)
     points = diagram.points
     triangles, owner = diagram.cells.fans()
     on_sphere = diagram.cells.points.shape[1] == 3

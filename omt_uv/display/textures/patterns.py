@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...solver.counts import check_pixels
 from ..canvas import write
 from .world import world_map
 
@@ -17,7 +18,9 @@ OUTLINE = np.array([0.23, 0.23, 0.23])
 
 
 def picture_of(kind: str, size: int) -> np.ndarray:
-    """The picture (h,w,3) in [0,1], top row first, of "checker", "circles" or "world", so many pixels wide."""
+    """The picture (h,w,3) in [0,1], top row first, of "checker", "circles" or "world", so many pixels wide.
+    Raises CountError for more than this machine has memory for."""
+    check_pixels(size * SAMPLES)
     return {"checker": labelled_checker, "circles": circle_packing, "world": world_map}[kind](size)
 
 

@@ -209,7 +209,7 @@ def remesh(vertices: np.ndarray, faces: Faces, count: int, *, progress: Callback
 
     Raises
     ------
-    CountError : fewer than the topology, boundaries and features take
+    CountError : fewer than the topology, boundaries and features take, or more than this machine has memory for
 
     References
     ----------

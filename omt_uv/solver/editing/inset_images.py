@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..counts import check_pixels
 from ..mesh.geometry import signed_areas
 from .image_warp import bilinear, continued, old_places, rounded
 
@@ -99,11 +100,16 @@ def warp_with_insets(
         are continued by `margin` pixels; what lies farther outside shows the picture as it was. Insets have as many
         channels as the picture; their alpha, if there is one, covers
 
+    Raises
+    ------
+    CountError : more pixels than this machine has memory for
+
     References
     ----------
     Zhao et al. 2013, sections 4.3 and 5.2
     """
     height, width = size or picture.shape[:2]
+    check_pixels(width, height)
     place, face = old_places(old, new, height, width)
     place, face, known = continued(place, face, margin)
     corner = np.arange(3 * len(new)).reshape(-1, 3)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..counts import BYTES_PER_ELEMENT, check_memory
 from ..errors import HandleError, NonFiniteError
 from ..mesh.closest_point import spread_points
 from ..mesh.geometry import cross3
@@ -48,7 +49,9 @@ def ball_domain(middle: np.ndarray, reach: float, samples: int = SAMPLES) -> Flo
     Raises
     ------
     NonFiniteError : the middle or the radius is no finite number
+    CountError : more samples than this machine has memory for
     """
+    check_memory(samples, BYTES_PER_ELEMENT, "A wall of {} samples")
     middle = np.asarray(middle, float)
     if not (np.isfinite(middle).all() and np.isfinite(reach) and reach > 0):
         raise NonFiniteError("The ball has no finite middle and radius", "Give finite numbers, the radius above 0")
@@ -66,7 +69,9 @@ def mesh_domain(vertices: np.ndarray, triangles: np.ndarray, samples: int = SAMP
     Raises
     ------
     HandleError : the mesh has no faces with area
+    CountError : more samples than this machine has memory for
     """
+    check_memory(samples, BYTES_PER_ELEMENT, "A wall of {} samples")
     corner = vertices[triangles]
     normal = cross3(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = np.linalg.norm(normal, axis=1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..counts import BYTES_OF_NUMBER, check_memory
 from ..mesh.geometry import nearest_rotations
 from .options import BLEND, RADIUS, RIGID, STRAIGHT
 
@@ -28,7 +29,9 @@ def handle_paths(
     Raises
     ------
     ValueError : an unknown kind
+    CountError : more samples than this machine has memory for
     """
+    check_memory(float(samples) * max(len(start), 1), BYTES_OF_NUMBER * start.shape[1], "A path of {} places")
     times = np.linspace(0.0, 1.0, samples + 1)
     straight = start + times[:, None, None] * (end - start)
     path = straight.copy()

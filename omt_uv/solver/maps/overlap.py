@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..counts import BYTES_PER_ELEMENT, check_memory
 from ..mesh.geometry import as_points, cross2, signed_areas
 from ..mesh.topology import expand, order_of_numbers
 from .contacts import lies_apart
@@ -26,7 +27,12 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     Points are drawn uniformly by area, so the standard error is sqrt(share / samples); the same seed gives the same
     points. 0 where no triangle has an area, and where a few triangles have less in common, pair by pair, than one
     point stands for. Time and memory stay bounded on maps that are mere noise.
+
+    Raises
+    ------
+    CountError : more samples than this machine has memory for
     """
+    check_memory(samples, BYTES_PER_ELEMENT, "A measure by {} samples")
     return _Areas(np.asarray(uv, float)).share(samples, seed)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..counts import check_memory
 from ..errors import CountError, EmptyMeshError, positive_density
 from ..mesh.geometry import face_areas
 from ..mesh.surface import with_loose_placed
@@ -26,6 +27,8 @@ REACH = 2.2
 ROUGH = 0.1
 # As often sites move to the means of Voronoi cells first: cells of equal mass around bad sites are long and thin.
 UNWEIGHTED = 1
+# What a cell takes at least: 40 samples are drawn to find where it begins.
+BYTES_PER_CELL = 1_000
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ def divide(
     Raises
     ------
     EmptyMeshError, NonFiniteError : no area, or vertices that are nowhere
-    CountError : fewer cells than separate parts
+    CountError : fewer cells than separate parts, or more than this machine has memory for
     DensityError : a density that is not positive and finite
     TransportError : no convergence
 
@@ -88,6 +91,7 @@ def divide(
     positions, triangles = np.asarray(positions, float), np.asarray(triangles, np.int64)
     if count < 1:
         raise CountError(f"{count} cells are none", "Ask for one cell or more")
+    check_memory(count, BYTES_PER_CELL, "A division into {} cells")
     if not len(triangles):
         raise EmptyMeshError("There are no faces to divide")
     positions = with_loose_placed(positions, triangles)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.density import graded_density
+from ..counts import BYTES_PER_VERTEX, check_memory
 from ..errors import CountError, positive_density
 from ..progress import Progress, Steps, part_of
 from .components.components import Component
@@ -66,10 +67,11 @@ def remesh(
     Raises
     ------
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError, OrientationError : see `components.split_components`
-    CountError : fewer than the topology, boundaries and features take
+    CountError : fewer than the topology, boundaries and features take, or more than this machine has memory for
     DensityError : a density that is not positive and finite
     """
     yield Progress("Parts", 0.0)
+    check_memory(count if options.counts_vertices else count / 2, BYTES_PER_VERTEX, "A mesh of about {} vertices")
     level = _checked_density(density, len(source.triangles))
     with source.frame.named():
         return (yield from _in_frame(source, count, options, source.frame.density(level)))

@@ -14,6 +14,7 @@ from scipy.sparse import diags
 from ..analysis.curvature import mean_curvature
 from ..canonical.markers import ChartMarkers
 from ..conformal.disk_map import conformal_disk
+from ..counts import BYTES_PER_ELEMENT, check_memory
 from ..errors import LandmarkError, NotADiskError
 from ..linalg.sparse import solve_spd
 from ..mesh.closest_point import subdivision_centroids
@@ -43,6 +44,7 @@ def marked_signature(
         nothing is
     NotADiskError : handles
     PrecisionError : the map leaves double precision
+    CountError : more points than this machine has memory for
 
     References
     ----------
@@ -56,6 +58,7 @@ def marked_signature(
     >>> found.points.shape
     (50, 2)
     """
+    check_memory(count, BYTES_PER_ELEMENT, "A signature of {} points")
     vertices, faces, centre, start = _outlined(positions, triangles, centre, start)
     found = yield from conformal_disk(vertices, faces)
     loop = boundary_loops(faces)[0]

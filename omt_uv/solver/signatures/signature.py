@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curvature import mean_curvature
 from ..conformal.moebius import centre_on_sphere
+from ..counts import BYTES_PER_ELEMENT, check_memory
 from ..errors import EmptyMeshError, ZeroAreaFaceError
 from ..mesh.charts import Chart, charts_of
 from ..mesh.geometry import face_areas, vertex_areas
@@ -62,6 +63,7 @@ def signature(positions: np.ndarray, triangles: np.ndarray, count: int = POINTS)
     Raises
     ------
     MeshError : what `sphere_map` raises, as for handles
+    CountError : more points than this machine has memory for
 
     >>> import numpy as np
     >>> from omt_uv.solver.progress import drain
@@ -71,6 +73,7 @@ def signature(positions: np.ndarray, triangles: np.ndarray, count: int = POINTS)
     >>> found.points.shape
     (50, 3)
     """
+    check_memory(count, BYTES_PER_ELEMENT, "A signature of {} points")
     vertices, faces = closed_part(positions, triangles)
     found = yield from sphere_map(vertices, faces, quality="draft")
     mass = vertex_areas(vertices, faces)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, vstack
 
+from ..counts import BYTES_PER_ELEMENT, check_memory, quadrupled
 from ..mesh.topology import next_corners
 
 # Sharpness of what stays sharp for ever.
@@ -73,9 +74,11 @@ def subdivide(coarse: Cage, levels: int, limit: bool = True) -> Subdivision:
     Raises
     ------
     ValueError : no level
+    CountError : more levels than this machine has memory for
     """
     if levels < 1:
         raise ValueError(f"levels must be at least 1, not {levels}")
+    _check_levels(coarse, levels)
     matrix = identity(coarse.count, format="csr")
     polygon = np.arange(len(coarse.face_start) - 1)
     for _ in range(levels):
@@ -85,6 +88,11 @@ def subdivide(coarse: Cage, levels: int, limit: bool = True) -> Subdivision:
     if limit:
         matrix = _limit(coarse) @ matrix
     return Subdivision(csr_matrix(matrix), coarse.corner_vertex.reshape(-1, 4), polygon)
+
+
+def _check_levels(coarse: Cage, levels: int) -> None:
+    quads = len(coarse.corner_vertex) * quadrupled(levels - 1)
+    check_memory(quads, BYTES_PER_ELEMENT, "A subdivided mesh of about {} quads", "Ask for fewer levels")
 
 
 def straight_boundary(coarse: Cage) -> Cage:
@@ -102,7 +110,9 @@ def straight_corners(coarse: Cage) -> Cage:
 
 
 def bilinear(coarse: Cage, levels: int) -> Subdivision:
-    """The cage subdivided without smoothing: every quad by its bilinear map, others into quads around their centre."""
+    """The cage subdivided without smoothing: every quad by its bilinear map, others into quads around their centre.
+    Raises CountError for more levels than this machine has memory for."""
+    _check_levels(coarse, levels)
     everywhere = replace(coarse, corner_sharpness=np.full(coarse.count, SHARP), ends=_topology(coarse).ends)
     everywhere = replace(everywhere, sharpness=np.full(len(everywhere.ends), SHARP))
     matrix, polygon = identity(coarse.count, format="csr"), np.arange(len(coarse.face_start) - 1)

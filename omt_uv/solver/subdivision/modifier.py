@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..counts import MOST_LEVELS
 from ..mesh.surface import Surface
 from ..mesh.topology import next_corners
 from .catmull_clark import SHARP, Cage, Subdivision, bilinear, straight_boundary, straight_corners, subdivide
@@ -50,7 +51,7 @@ class SubdividedSurface:
 
 def subdivided_surface(surface: Surface, modifier: SubdivisionModifier, most: int) -> SubdividedSurface:
     """The subdivided surface at the level of the modifier, or at a lower one with at most so many quads."""
-    quads = 4.0 ** np.arange(modifier.levels) * len(surface.corner_vertex)
+    quads = 4.0 ** np.arange(min(modifier.levels, MOST_LEVELS)) * len(surface.corner_vertex)
     levels = max(1, int((quads <= most).sum()))
     cage = Cage(
         corner_vertex=surface.corner_vertex,

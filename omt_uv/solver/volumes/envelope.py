@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..counts import BYTES_PER_ELEMENT, check_memory
 from ..errors import LibraryError, NonFiniteError, TetrahedraError
 from ..flows.enclosed_volume import corner_volumes
 from .meshing import GROWTH, TetMesh, without_chords
@@ -42,6 +43,7 @@ def filled(vertices: np.ndarray, triangles: np.ndarray, count: int = 40_000) -> 
 
     Raises
     ------
+    CountError : more than this machine has memory for
     LibraryError : fTetWild is not installed
     NonFiniteError : coordinates are not finite
     TetrahedraError : nothing is inside
@@ -50,6 +52,7 @@ def filled(vertices: np.ndarray, triangles: np.ndarray, count: int = 40_000) -> 
     ----------
     Hu, Schneider, Wang, Zorin, Panozzo 2020
     """
+    check_memory(count, BYTES_PER_ELEMENT, "A body of about {} tetrahedra")
     wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(wrong):
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..contact.self_intersections import intersecting_pairs
+from ..counts import BYTES_PER_ELEMENT, check_memory
 from ..errors import LibraryError, SelfIntersectionError, TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
 from ..mesh.topology import halfedges, pair_keys, paired
@@ -42,10 +43,12 @@ def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, count: int = 40_000)
 
     Raises
     ------
+    CountError : more than this machine has memory for
     LibraryError : TetGen is not installed
     SelfIntersectionError : faces pass through one another
     TetrahedraError : TetGen finds none
     """
+    check_memory(count, BYTES_PER_ELEMENT, "A body of about {} tetrahedra")
     crossing = intersecting_pairs(vertices, triangles)
     if len(crossing):
         raise SelfIntersectionError(

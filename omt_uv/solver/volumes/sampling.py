@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..counts import BYTES_PER_ELEMENT, check_memory, quadrupled
 from .shells import icosphere
 from .transfer import TetLocation
 
 
 def ball_index(levels: int, shells: int) -> np.ndarray:
     """Places (s,3) in the unit ball, shell after shell from the middle, each on the 20 * 4^levels faces of an
-    icosahedron."""
+    icosahedron. Raises CountError for more than this machine has memory for."""
+    check_memory(20 * shells * quadrupled(levels), BYTES_PER_ELEMENT, "An index of about {} places")
     vertices, triangles = icosphere(levels)
     centre = vertices[triangles].mean(axis=1)
     centre /= np.linalg.norm(centre, axis=1)[:, None]
@@ -35,7 +37,12 @@ def interior_points(
     """Points (count,3) inside a body, evenly dense: an even lattice of the ball, taken back by the map.
 
     points (n,3), tetrahedra (m,4), and positions (n,3) in the ball; seed turns the lattice
+
+    Raises
+    ------
+    CountError : more than this machine has memory for
     """
+    check_memory(count, BYTES_PER_ELEMENT, "A lattice of {} points")
     rng = np.random.default_rng(seed)
     shift = rng.uniform(size=3)
     k = np.arange(count)[:, None]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..counts import BYTES_PER_ELEMENT, check_memory, quadrupled
 from ..flows.enclosed_volume import corner_volumes
 from .tet_mesh import EDGES, tet_volumes
 
@@ -30,8 +31,9 @@ def shell_surfaces(points: np.ndarray, positions: np.ndarray, tets: np.ndarray, 
     """Surfaces (count) in a body, spheres of its ball map, that divide it into count + 1 parts of equal volume.
 
     points (n,3), tetrahedra (m,4), and positions (n,3) in the ball. Radii are found by halving, so that volumes are
-    equal however coarse the tetrahedra are.
+    equal however coarse the tetrahedra are. Raises CountError for more than this machine has memory for.
     """
+    check_memory(count, BYTES_PER_ELEMENT, "A family of {} shells")
     radius = np.linalg.norm(positions, axis=1)
     whole = float(tet_volumes(points, tets).sum())
     return tuple(_enclosing(points, tets, radius, k / (count + 1) * whole) for k in range(1, count + 1))
@@ -85,7 +87,8 @@ def _triangles(pattern: int) -> list[tuple[int, ...]]:
 
 def icosphere(levels: int) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n,3) of the unit sphere and triangles (m,3), looking outwards: an icosahedron divided `levels`
-    times."""
+    times. Raises CountError for more than this machine has memory for."""
+    check_memory(20 * quadrupled(levels), BYTES_PER_ELEMENT, "A sphere of about {} faces")
     g = (1 + 5**0.5) / 2
     base = np.array([(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0)], float)
     points = np.concatenate([base, base[:, [2, 0, 1]], base[:, [1, 2, 0]]]) / np.hypot(1, g)

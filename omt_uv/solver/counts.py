@@ -1,0 +1,50 @@
+"""Refuse counts that no machine has memory for, before any is asked for."""
+
+from __future__ import annotations
+
+import os
+
+from .errors import CountError
+
+# What a point, face, quad, tetrahedron, sample or shell takes at least while it is made.
+BYTES_PER_ELEMENT = 100
+# What a vertex of a new mesh takes at least while it is made: 13 kB between 10,000 and 40,000 vertices.
+BYTES_PER_VERTEX = 10_000
+# Numbers of a pixel of a picture, at least.
+CHANNELS = 3
+BYTES_OF_NUMBER = 8
+# Beyond so many levels there is no telling them apart: no machine has memory for a quarter of them.
+MOST_LEVELS = 32
+
+
+def check_memory(count: float, each: float, what: str, remedy: str = "Ask for fewer") -> None:
+    """Raise CountError where `count` things of at least `each` bytes are more than the memory of this machine.
+
+    what : the things, with braces for their count, as the subject of a sentence in the singular
+
+    >>> check_memory(10, 100, "A mesh of about {} vertices")
+    """
+    if not hasattr(os, "sysconf"):
+        return
+    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    # Integers of Python have no limit, floats overflow to infinity, and what is no number is not below either.
+    if not count <= there / each:
+        raise CountError(
+            f"{what.format(f'{count:.3g}')} takes more memory to make than the {there / 1e9:.3g} GB of this machine",
+            remedy,
+        )
+
+
+def check_pixels(width: int, height: int | None = None) -> None:
+    """Raise CountError for so many pixels across and, if not as many, down that this machine has no memory for them."""
+    pixels = float(width) * float(width if height is None else height)
+    check_memory(pixels, CHANNELS * BYTES_OF_NUMBER, "A picture of {} pixels", "Ask for a smaller one")
+
+
+def quadrupled(levels: int) -> float:
+    """How many there are of one that becomes four so many times; beyond `MOST_LEVELS`, as many as after those.
+
+    >>> quadrupled(2), quadrupled(10**9) == quadrupled(MOST_LEVELS)
+    (16.0, True)
+    """
+    return 4.0 ** min(levels, MOST_LEVELS)
