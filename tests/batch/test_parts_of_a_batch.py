@@ -378,7 +378,9 @@ def test_growth_is_that_of_the_larger_half_of_what_is_known():
     slow = [(x, y + (100 if x < 16 else 0)) for x, y in pairs]
     for given in (pairs, slow, [*pairs, (0.0, 5.0), (5.0, 0.0), (-1.0, 2.0)], pairs[::-1]):
         assert statistics.growth_of(given) == pytest.approx(1.5)
-    assert statistics.growth_of(pairs[: statistics.LEAST - 1]) is None
+    few = pairs[: statistics.LEAST - 1]
+    for given in (few, [*few, (0.0, 5.0), (5.0, 0.0)]):
+        assert statistics.growth_of(given) is None
     assert statistics.growth_of([(7.0, y) for _, y in pairs]) is None
     rows = [{"a": 1, "b": None}, {"a": 2.5}, {"a": "x", "b": 3}]
     assert statistics._column(rows, "a") == [1.0, 2.5, None] and statistics._column(rows, "b") == [None, None, 3.0]

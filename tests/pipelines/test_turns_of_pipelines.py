@@ -578,6 +578,12 @@ def test_offsets_turn_and_grow_as_the_surface_does(size):
     (found,) = onto._turned((Key(offsets),), V, target, SimpleNamespace(triangles=F))
     np.testing.assert_allclose(found.offsets, size * offsets @ turn.T, atol=1e-9)
     assert onto._turned((), V, target, SimpleNamespace(triangles=F)) == ()
+    # Where parts grow differently all offsets still grow alike, by the root of the mean square of all edges.
+    target = SimpleNamespace(positions=size * V * np.where(V[:, 2:] > 0, 3.0, 1.0))
+    (found,) = onto._turned((Key(offsets),), V, target, SimpleNamespace(triangles=F))
+    edges = [np.concatenate([p[F[:, k]] - p[F[:, k - 1]] for k in range(3)]) for p in (V, target.positions)]
+    old, new = (np.linalg.norm(x) for x in edges)
+    np.testing.assert_allclose(np.linalg.norm(found.offsets, axis=1), new / old * np.linalg.norm(offsets, axis=1))
 
 
 # ---- figures of regions ----------------------------------------------------------------------------------------

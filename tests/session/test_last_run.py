@@ -84,6 +84,17 @@ def test_a_file_that_is_loaded_has_no_result(last_run):
     assert last_run.state.summary is None
 
 
+@pytest.mark.parametrize(
+    ("told", "good"),
+    [({}, True), ({"rows": (("A", "1"),)}, True), ({"refused": True}, False), ({"beyond": frozenset("A")}, False),
+     ({"notices": "One"}, False)],
+)  # fmt: skip
+def test_whatever_there_is_to_say_against_a_run_is_against_it(package, told, good):
+    last_run = package("session.last_run")
+    told = {name: (last_run.Notice(value),) if name == "notices" else value for name, value in told.items()}
+    assert last_run.Summary("Unwrap", **told).is_good is good
+
+
 def test_a_check_mark_is_for_what_is_within_all_bounds(last_run, package):
     icon_of = package("panels.result").icon_of
     scenes.bump(height=0.1)

@@ -152,6 +152,8 @@ def test_handle_files_say_what_goes_where(tmp_path):
         ('{"handles": []}', "no list of handles"),
         ('[{"grup": "a"}]', "'grup'"),
         ('[{"group": "none"}]', "has no vertices"),
+        ('[{"vertices": [0]}, {"group": "none"}]', "handle 1 has no vertices"),
+        ('[{"from": [0, 0, 0], "to": [0, 0, 1]}, {"vertices": [0], "object": "B"}]', "handle 1 has no vertices"),
         ('[{"vertices": [99]}]', "vertices 0 to 41"),
         ('[{"vertices": ["a"]}]', "no list of numbers"),
         ('[{"vertices": [1.5]}]', "no list of numbers"),
