@@ -6,6 +6,7 @@ Each stage may be replaced by a milder one where its mathematics leaves double p
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -194,22 +195,25 @@ def refined_again(
 
     crossing: a free boundary may come to cross itself
     """
+    return (yield from refined_on(chart, uv, options, target, crossing=crossing)).uv
+
+
+def refined_on(
+    chart: Chart, uv: np.ndarray, options: MapOptions, target: Target | None = None, **changes: Any
+) -> Steps[Refinement]:
+    """What `refined_again` gives, and how it was found; changes : of the `RefinementOptions` that it has."""
     vertices, unit = in_unit_box(chart.vertices)
     disk = _disk_mesh(vertices, chart, options, target, RunLog(), ChartMarkers())
     start = with_centres(uv / unit, disk.triangles, len(disk.vertices))
-    again = RefinementOptions(
-        boundary=disk.boundary,
-        balance=options.balance,
-        quality=options.quality,
-        warm_start=True,
-        crossing=crossing,
-    )
+    again = _refinement_options(disk, options, InitialChartMap(start, warm=True), True)
+    again = replace(again, **{"order": None, **changes})
     asked = None if target is None else disk.target
     refined = yield from refine(
         disk.vertices, disk.triangles, start, again, target=asked, region=disk.region, polygons=disk.polygons
     )
     density = None if target is None else target.density
-    return placed_chart(refined.uv[: len(uv)], vertices, chart, density, unit, None, disk.boundary == "free")
+    uv = placed_chart(refined.uv[: len(uv)], vertices, chart, density, unit, None, disk.boundary == "free")
+    return replace(refined, uv=uv)
 
 
 def _chart_map(
@@ -235,15 +239,9 @@ def _chart_map(
 
 def no_map(chart: Chart, failure: MeshError) -> ChartMap:
     """What stands for the map of a chart that has none in double precision, until it is cut further."""
-    return ChartMap(
-        uv=np.zeros((len(chart.vertices), 2)),
-        status="failed",
-        area_l1=np.inf,
-        area_sd=np.inf,
-        angle_mean=np.inf,
-        folds=len(np.unique(chart.faces)),
-        failure=failure,
-    )
+    without = dict.fromkeys(("area_l1", "area_sd", "angle_mean"), np.inf)
+    uv, folds = np.zeros((len(chart.vertices), 2)), len(np.unique(chart.faces))
+    return ChartMap(uv=uv, status="failed", folds=folds, failure=failure, **without)
 
 
 def _stages(uv: np.ndarray, conformal, cells, figures: Distortion, log: RunLog, warnings: tuple[str, ...]) -> ChartMap:
@@ -435,13 +433,10 @@ def placed_chart(
     uv = uv * np.sqrt((area.sum() if density is None else area @ density) / covered)
     if pins is not None:
         return moved_to_pins(uv, chart.triangles, pins)
-    return (_about_zero(uv, chart.triangles) if centred else uv) * unit
-
-
-def _about_zero(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """A map (n,2) with its centroid moved to 0."""
-    area = signed_areas(uv, triangles)
-    return uv - area @ uv[triangles.T].mean(axis=0) / area.sum()
+    if centred:
+        area = signed_areas(uv, chart.triangles)
+        uv = uv - area @ uv[chart.triangles.T].mean(axis=0) / area.sum()
+    return uv * unit
 
 
 def in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:

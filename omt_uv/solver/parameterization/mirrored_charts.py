@@ -25,11 +25,24 @@ from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import boundary_loops, distinct, graph_components, on_boundary, pair_keys
 from ..progress import Steps
 from ..refinement.initial_maps import is_curved, unroll
+from ..refinement.refine import Refinement
 from .chart_indices import ChartPins, identity, in_order_of_corners, in_order_of_places
-from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
+from .chart_map import (
+    UNROLLED,
+    ChartMap,
+    in_unit_box,
+    map_chart,
+    measured_chart,
+    measured_map,
+    placed_chart,
+    refined_on,
+)
 from .convex_maps import with_figures
 from .options import MapOptions
 
+# Maps of charts that are nearly what is looked for, None for those that have none; and what maps charts, from there on.
+Starts = list[ChartMap | None] | None
+MapCharts = Callable[..., Steps[list[ChartMap]]]
 # Relative difference of densities of mirror images up to which they are the same.
 SAME_DENSITY = 1e-4
 # Area error, over the goal, that a map of symmetric quads may leave in the triangles that they came as.
@@ -242,8 +255,12 @@ def map_completed(
     target: Target | None = None,
     pins: ChartPins | None = None,
     markers: ChartMarkers | None = None,
+    start: ChartMap | None = None,
 ) -> Steps[ChartMap]:
-    """`map_chart`, with a free boundary of the chart `with_missing_images`: the map is symmetric but for them."""
+    """`map_chart`, with a free boundary of the chart `with_missing_images`: the map is symmetric but for them.
+
+    start : a map without folds that is nearly what is looked for, refined on where nothing is missing
+    """
     plain = options.boundary == "free" and options.kind == "authalic" and target is None and pins is None
     given: dict[str, Any] = {"options": options, "target": target, "pins": pins, "markers": markers}
     alone = None
@@ -260,7 +277,22 @@ def map_completed(
                 return _without_images(chart, found)
         except MeshError:
             pass  # it is that of the images, or the chart alone has it, too, and says where
+    elif plain and start is not None and alone is None:
+        refined = yield from refined_on(chart, start.uv, options, warm_start=False)
+        if refined.status == "converged":
+            return _refined_from(start, chart, refined)
     return (yield from map_chart(chart, **given)) if alone is None else alone
+
+
+def _refined_from(start: ChartMap, chart: Chart, refined: Refinement) -> ChartMap:
+    """What was found from the map of a chart on, with the figures of now."""
+    return replace(
+        with_figures(start, refined.uv, measured_map(chart, refined.uv, None)),
+        newton_refinement=refined.iterations,
+        residual_refinement=refined.residual,
+        status=refined.status,
+        area_weight=refined.area_weight,
+    )
 
 
 def _may_unroll(chart: Chart) -> bool:
@@ -324,14 +356,14 @@ def _is_flat(chart: Chart) -> bool:
 
 
 def mapped_anew(
-    charts: list[Chart],
-    known: list[tuple[Chart, ChartMap]],
-    map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
+    charts: list[Chart], known: list[tuple[Chart, ChartMap]], map_charts: MapCharts
 ) -> Steps[list[ChartMap]]:
-    """Maps of the charts; those that are as known ones were have the maps of these."""
+    """Maps of the charts; those that are as known ones were have the maps of these, and parts of them start there."""
     maps = {identity(chart): (chart, chart_map) for chart, chart_map in known}
     names = [identity(chart) for chart in charts]
-    new = yield from map_charts([chart for chart, name in zip(charts, names, strict=True) if name not in maps])
+    others = [chart for chart, name in zip(charts, names, strict=True) if name not in maps]
+    starts = _where_they_lie(others, known)
+    new = yield from map_charts(others) if starts is None else map_charts(others, starts)
     rest = iter(new)
     return [
         _numbered_as(chart, *maps[name]) if name in maps else next(rest)
@@ -339,14 +371,44 @@ def mapped_anew(
     ]
 
 
-def with_known_maps(
-    map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
-) -> Callable[[list[Chart]], Steps[list[ChartMap]]]:
+def _where_they_lie(charts: list[Chart], known: list[tuple[Chart, ChartMap]]) -> Starts:
+    """Of charts that are parts of known ones, the maps that they are of; None for all others, and where there are no
+    such charts. What is slit would begin where it touches itself."""
+    whole = [(chart, found) for chart, found in known if _may_be_parted(chart, found)]
+    if not charts or not whole:
+        return None
+    size = 1 + max(int(chart.corners.max()) for chart in (*charts, *(chart for chart, _ in whole)))
+    owner, vertex = np.full(size, -1), np.zeros(size, np.int64)
+    for k, (chart, _) in enumerate(whole):
+        owner[chart.corners], vertex[chart.corners] = k, chart.triangles
+    starts = list[ChartMap | None]()
+    for chart in charts:
+        k, there = owner[chart.corners], np.zeros(len(chart.vertices), np.int64)
+        there[chart.triangles] = vertex[chart.corners]
+        within = k.min() == k.max() >= 0 and not len(chart.patches) and len(np.unique(there)) == len(there)
+        # Where a seam was closed, vertices were several.
+        within = within and np.array_equal(there[chart.triangles], vertex[chart.corners])
+        found = whole[int(k.max())][1]
+        starts.append(replace(found, uv=found.uv[there]) if within else None)
+    return starts if any(start is not None for start in starts) else None
+
+
+def _may_be_parted(chart: Chart, found: ChartMap) -> bool:
+    return found.failure is None and found.status == "converged" and not found.folds and not len(chart.patches)
+
+
+def with_known_maps(map_charts: MapCharts) -> MapCharts:
     """What maps charts, which gives for one that is as another was the map of that: see `mapped_anew`."""
     known: list[tuple[Chart, ChartMap]] = []
 
-    def again(charts: list[Chart]) -> Steps[list[ChartMap]]:
-        maps = yield from mapped_anew(charts, known, map_charts)
+    def again(charts: list[Chart], starts: list[ChartMap] | None = None) -> Steps[list[ChartMap]]:
+        begun = {} if starts is None else {identity(c): start for c, start in zip(charts, starts, strict=True)}
+
+        def others(charts: list[Chart], parts: Starts = None) -> Steps[list[ChartMap]]:
+            own = [begun.get(identity(chart)) for chart in charts] if begun else parts
+            return map_charts(charts) if own is None else map_charts(charts, own)
+
+        maps = yield from mapped_anew(charts, known, others)
         known.extend(zip(charts, maps, strict=True))
         return maps
 

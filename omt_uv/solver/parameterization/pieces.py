@@ -159,7 +159,7 @@ def _pieces(
     if not parts or not sound_disks(parts).all():
         return ([chart], [chart_map]), between[:0]
     # What hangs on nothing any more can do with less shear.
-    again = yield from map_charts(parts)
+    again = yield from map_charts(parts, maps)
     return (parts, again if _shears_less(parts, again, maps) else maps), between
 
 

@@ -301,7 +301,9 @@ def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: Ear
     with limbs the last half of a hundredth of the areas shears more than a further seam takes away."""
     if map_sparing is None or not (last.pressing[last.searched] <= (1 + SPARED) * last.bound).all():
         return last
-    mapped = yield from unless_ended(map_sparing([last.charts[k] for k in last.searched]), early)
+    chosen = [last.charts[k] for k in last.searched]
+    starts = [None if last.maps[k].folds else last.maps[k] for k in last.searched]
+    mapped = yield from unless_ended(map_sparing(chosen, starts), early)
     if not mapped:
         return last
     spared = dict(zip(last.searched, mapped, strict=True))

@@ -37,6 +37,8 @@ from .chart_indices import (
 from .chart_map import WITHOUT_MAP, ChartMap, no_map, refined_again
 from .convex_maps import with_convex_polygons, with_drawn_triangles, with_folds_counted
 from .mirrored_charts import (
+    MapCharts,
+    Starts,
     as_given,
     cut_alike,
     equal_chart_map,
@@ -95,7 +97,8 @@ class CutCharts:
 
     surface : with its quads cut along their shorter diagonals
     joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`
-    search : that found the seams for a bound of the shear, if there is one
+    search : that found the seams for a bound of the shear, if there is one; starts : maps of the joined charts that
+        are nearly what is looked for
     """
 
     surface: Surface
@@ -106,6 +109,7 @@ class CutCharts:
     pairs: dict[int, tuple[int, np.ndarray]]
     maps: dict[int, ChartMap]
     search: ShearSearch | None = None
+    starts: Starts = None
 
     @property
     def alike(self) -> list[int]:
@@ -326,27 +330,31 @@ class _Task:
     markers: MapMarkers | None = None
     cut_anew: bool = False
 
-    def map_one(self, chart: Chart) -> Steps[ChartMap]:
-        """The map of one chart; errors have the element indices of the surface."""
+    def map_one(self, chart: Chart, start: ChartMap | None = None) -> Steps[ChartMap]:
+        """The map of one chart, from a start on where there is one; errors have the element indices of the surface."""
         pins = pins_of_chart(self.pins, chart)
         target = chart_target(self.target, self.surface, chart)
         marked = markers_of_chart(self.markers, chart)
         try:
             given: dict[str, Any] = {"options": self.options, "target": target, "pins": pins, "markers": marked}
-            return (yield from map_completed(chart, **given))
+            return (yield from map_completed(chart, start=start, **given))
         except MeshError as error:
             failure = located(error, chart)
             if self.cut_anew and pins is None and isinstance(error, WITHOUT_MAP):
                 return no_map(chart, failure)
             raise failure from error
 
-    def map_charts(self, charts: list[Chart]) -> Steps[list[ChartMap]]:
-        """Maps of charts by themselves."""
+    def map_charts(self, charts: list[Chart], starts: Starts = None) -> Steps[list[ChartMap]]:
+        """Maps of charts by themselves, large ones from starts on where these are given."""
         if not charts:
             return []
-        found = yield from self.map_symmetric(_to_be_mapped(self.surface, _only(charts), self.pins, self.target))
-        places = [np.argsort(in_order_of_places(chart)[1]) for chart in charts]
-        return [replace(one, uv=one.uv[place]) for one, place in zip(found, places, strict=True)]
+        cut = _to_be_mapped(self.surface, _only(charts), self.pins, self.target)
+        orders = [in_order_of_places(chart)[1] for chart in charts]
+        if starts is not None:
+            begun = zip(starts, orders, strict=True)
+            cut = replace(cut, starts=[None if s is None else replace(s, uv=s.uv[order]) for s, order in begun])
+        found = yield from self.map_symmetric(cut)
+        return [replace(one, uv=one.uv[np.argsort(order)]) for one, order in zip(found, orders, strict=True)]
 
     def finished(self, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[_Drawn]:
         """Charts with the triangles of the surface as it was given; maps with convex polygons, their folds counted."""
@@ -367,7 +375,7 @@ class _Task:
         return (yield from refined_again(chart, chart_map.uv, self.options, target, crossing=True))
 
     @property
-    def sparing(self) -> Callable[[list[Chart]], Steps[list[ChartMap]]] | None:
+    def sparing(self) -> MapCharts | None:
         """Maps charts with areas that are as exact as Standard promises and no more; None for other qualities."""
         if self.options.quality != "standard" or self.options.balance > 0:
             return None
@@ -429,7 +437,8 @@ class _Task:
                 chart_map = equal_chart_map(chart, cut.targets[k], alone)
             if chart_map is None:
                 share = (1 - begun) * len(chart.triangles) / left
-                chart_map = yield from part_of(self.map_one(chart), done, share)
+                start = None if cut.starts is None or is_small(chart) else cut.starts[k]
+                chart_map = yield from part_of(self.map_one(chart, start), done, share)
                 done += share
                 alone += [(chart, cut.targets[k], chart_map)] if moves else []
             maps.append(chart_map)

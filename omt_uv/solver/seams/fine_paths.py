@@ -34,8 +34,9 @@ FEWER_STEPS = 2.0
 WIDER = (8.0, 64.0, np.inf)
 
 
-# Share of the vertices that have an image in a component with a mirror plane, and in a scan with one.
-MIRRORED_SHARE = (0.97, 0.9)
+# Share of the vertices that have an image in a component with a mirror plane, in a scan with one, and where half of one
+# stands for the other: a raised arm would have the seams of one that hangs.
+MIRRORED_SHARE = (0.97, 0.9, 0.95)
 # Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
 EXACT = 1e-4
 NEARLY = 0.03
@@ -45,13 +46,14 @@ NEARLY = 0.03
 class FineMirror:
     """The mirror image (n,) of every vertex of a component, its height (n,) over the plane, the normal (3,) of that,
     and which lie in it or on a line of edges along it, (n,) bool; exact: whether images are vertices, nearly all, and
-    no such line is needed."""
+    no such line is needed; alike: whether one half stands for both."""
 
     image: np.ndarray
     height: np.ndarray
     normal: np.ndarray
     plane: np.ndarray
     exact: bool
+    alike: bool = True
 
     @property
     def side(self) -> np.ndarray:
@@ -74,14 +76,16 @@ def fine_mirror(component: CutComponent, plane: SymmetryPlane, own: np.ndarray, 
     in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
     if np.mean(distance <= EXACT) >= MIRRORED_SHARE[0] and in_plane.any():
         return FineMirror(image, height, plane.normal, in_plane, exact=True)
-    if np.mean(distance <= NEARLY) < MIRRORED_SHARE[1]:
+    near = float(np.mean(distance <= NEARLY))
+    if near < MIRRORED_SHARE[1]:
         return None
     # The other side of what is thin may be nearer.
     normals = NEARLY * vertex_normals(points, component.triangles)
     there = _reflected(normals, normals @ plane.normal, plane.normal)
     places = np.concatenate([_reflected(points, height, plane.normal), there], axis=1)
     _, image = cKDTree(np.concatenate([points, normals], axis=1)).query(places)
-    return with_line(component, FineMirror(image, height, plane.normal, in_plane, exact=False))
+    alike = near >= MIRRORED_SHARE[2]
+    return with_line(component, FineMirror(image, height, plane.normal, in_plane, exact=False, alike=alike))
 
 
 def _reflected(points: np.ndarray, height: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ large as they had to be. An artist takes off a head or an arm, at the neck: a cu
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -211,7 +211,10 @@ class _Boxes:
 @dataclass(frozen=True)
 class _Body:
     """A chart with its map uv (n,2) and its polygons, the places (p,2) of these in the map; price (e,) of the edges
-    between them, whose mean is their length, and the same as capacity (e,) and as length (e,) in the map."""
+    between them, whose mean is their length, and the same as capacity (e,) and as length (e,) in the map.
+
+    known_boxes, known_sides : what was found of pieces, by their polygons
+    """
 
     chart: Chart
     uv: np.ndarray
@@ -221,6 +224,8 @@ class _Body:
     price: np.ndarray
     capacity: np.ndarray
     steps: np.ndarray
+    known_boxes: dict[bytes, np.ndarray] = field(default_factory=dict)
+    known_sides: dict[bytes, list[np.ndarray]] = field(default_factory=dict)
 
     @staticmethod
     def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, images: MirrorImages | None = None) -> _Body:
@@ -255,14 +260,26 @@ class _Body:
 
     def pieces(self, cut: np.ndarray) -> tuple[list[Chart], list[np.ndarray]]:
         """The pieces that a cut (e,) bool leaves, and their maps, upright."""
-        piece = self.graph.pieces(~cut)[self.graph.polygon]
-        found = [part_of_chart(self.chart, piece == k) for k in range(int(piece.max()) + 1)]
+        piece = self.graph.pieces(~cut)
+        return self._upright([piece == k for k in range(int(piece.max()) + 1)])
+
+    def _upright(self, pieces: Sequence[np.ndarray]) -> tuple[list[Chart], list[np.ndarray]]:
+        """Charts of pieces of polygons (p,) bool, and their maps, upright."""
+        found = [part_of_chart(self.chart, here[self.graph.polygon]) for here in pieces]
         charts = [part for part, _ in found]
         return charts, _laid(charts, [self.uv[used] for _, used in found], self.up)
 
+    def _box(self, here: np.ndarray) -> np.ndarray:
+        """The sides (2,) of the box of a piece of polygons (p,) bool: few of those that a cut leaves are new."""
+        piece = np.packbits(here).tobytes()
+        if piece not in self.known_boxes:
+            self.known_boxes[piece] = np.ptp(self._upright([here])[1][0], axis=0)
+        return self.known_boxes[piece]
+
     def boxes(self, cut: np.ndarray) -> _Boxes:
         """The boxes of all pieces that a cut (e,) bool leaves."""
-        sides = np.array([np.ptp(uv, axis=0) for uv in self.pieces(cut)[1]])
+        piece = self.graph.pieces(~cut)
+        sides = np.array([self._box(piece == k) for k in range(int(piece.max()) + 1)])
         between = BETWEEN if len(sides) > 1 else 1.0
         return _Boxes(self.whole, between * float(sides.prod(axis=1).sum()), float(sides.max()))
 
@@ -317,10 +334,7 @@ class _Body:
         for k in np.flatnonzero(size > 2 * LEAST_LIMB * self.whole):
             here = piece == k
             inner = ~cut & here[self.graph.joined[:, 0]]
-            for far in self._from_tips(here, inner):
-                side = self._narrowest(here, inner, far)
-                if side is None:
-                    continue
+            for side in self._sides(here, inner):
                 neck = inner & (side[self.graph.joined[:, 0]] != side[self.graph.joined[:, 1]])
                 smaller = min(float(self.graph.area[side].sum()), float(self.graph.area[here & ~side].sum()))
                 if self.price[neck].sum() > NECK * np.sqrt(smaller):
@@ -332,6 +346,15 @@ class _Body:
                 parts = np.bincount(self.graph.pieces(~(cut | both)), self.graph.area)
                 if parts.min() >= LEAST_PART * self.whole:
                     yield both
+
+    def _sides(self, here: np.ndarray, inner: np.ndarray) -> list[np.ndarray]:
+        """The sides (p,) bool of the narrowest cuts through a piece of polygons (p,) bool, joined by edges `inner` (e,)
+        bool, one for every tip that has one."""
+        piece = np.packbits(here).tobytes()
+        if piece not in self.known_sides:
+            found = (self._narrowest(here, inner, far) for far in self._from_tips(here, inner))
+            self.known_sides[piece] = [side for side in found if side is not None]
+        return self.known_sides[piece]
 
     def _from_tips(self, here: np.ndarray, inner: np.ndarray) -> Iterator[np.ndarray]:
         """Distances (p,) in the map of polygons `here` (p,) bool, joined by edges `inner` (e,) bool, from the tips of

@@ -397,7 +397,7 @@ class SeamSearch:
         """One of the coarse surfaces of a component, whose mirror plane stays a line, and its model."""
         line, count = None if mirror is None else mirror.plane, round(finer * self.options.vertices)
         parts, coarse = (component.positions, component.triangles, self.options.vertices), None
-        if mirror is not None:
+        if mirror is not None and mirror.alike:
             seen = mirror.plane, mirror.image, mirror.height, mirror.normal
             half = self._begun(component, line, partial(half_coarsening, *parts, *seen))
             coarse = None if half is None else half.ended(count, trial)

@@ -15,7 +15,7 @@ from omt_uv.solver.analysis.straight_paths import TURN
 from omt_uv.solver.cutting import component_order
 from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import MeshError, PinError
-from omt_uv.solver.mesh.charts import Chart
+from omt_uv.solver.mesh.charts import Chart, part_of_chart
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
@@ -75,7 +75,7 @@ def round_of(
     areas = np.array(areas, float)
     searched = np.flatnonzero(pressing > bound).tolist() if searched is None else searched
     charts = charts or [SimpleNamespace(faces=np.array([k])) for k in range(len(areas))]
-    maps = maps or [SimpleNamespace(failure=None) for _ in areas]
+    maps = maps or [SimpleNamespace(failure=None, folds=0) for _ in areas]
     cuts = cuts_of(edges)
     steep = np.broadcast_to(steep, areas.shape)
     return shear_search.Round(charts, maps, cuts, memory or {}, areas, means, steep, pressing, bound, searched)
@@ -316,13 +316,17 @@ def test_charts_may_cross_themselves_where_they_miss_the_bound_by_much_or_late(m
         (1.35 * 1.04, False, 1.3, False),
     ],
 )
+@pytest.mark.parametrize("folds", [0, 2])
 def test_areas_are_spared_where_the_bound_is_missed_by_little_and_it_helps(
-    pressing, sparing, after, taken, monkeypatch
+    folds, pressing, sparing, after, taken, monkeypatch
 ):
     last = round_of([1, 1], [1.0, pressing])
+    last.maps[1].folds = folds
     asked = []
 
-    def spare(charts):
+    def spare(charts, starts):
+        # They begin where they lie, unless that has folds.
+        assert starts == [None if folds else last.maps[1]]
         asked.append(charts)
         return ["spared"]
         yield
@@ -1093,7 +1097,8 @@ def test_two_triangles_get_one_polygon_unless_a_cut_has_parted_them():
 
 def test_charts_that_are_as_before_keep_their_maps():
     V, F = meshes.grid(2, 2)
-    known, new = chart_of(V, F), chart_of(V, F[:4])
+    known, new = chart_of(V, F), chart_of(V + 1, F)
+    new = replace(new, corners=new.corners + 100)
     asked = []
 
     def map_charts(charts):
@@ -1101,22 +1106,78 @@ def test_charts_that_are_as_before_keep_their_maps():
         return ["new"] * len(charts)
         yield
 
-    assert drain(mirrored_charts.mapped_anew([new, known], [(known, "known")], map_charts)) == ["new", "known"]
+    found = flat_map(V)
+    assert drain(mirrored_charts.mapped_anew([new, known], [(known, found)], map_charts)) == ["new", found]
     assert asked == [new]
+
+
+def flat_map(V, **given):
+    figures = {"area_l1": 0.0, "area_sd": 0.0, "angle_mean": 1.0, "folds": 0, "status": "converged"}
+    return ChartMap(uv=V[:, :2].copy(), **{**figures, **given})
+
+
+@pytest.mark.parametrize(
+    ("given", "begins"),
+    [({}, True), ({"folds": 1}, False), ({"status": "steps"}, False), ({"failure": MeshError("No")}, False)],
+)
+def test_parts_of_charts_start_where_these_lie(given, begins):
+    V, F = meshes.grid(3, 3)
+    rng = np.random.default_rng(0)
+    whole, other = chart_of(V, F), replace(chart_of(V, F[:6]), corners=3 * len(F) + np.arange(18).reshape(-1, 3))
+    part, used = part_of_chart(whole, np.arange(len(F)) < 10)
+    order = rng.permutation(len(used))
+    part = replace(part, vertices=part.vertices[order], triangles=np.argsort(order)[part.triangles])
+    known, asked = flat_map(rng.normal(size=(len(V), 2)), **given), []
+
+    def map_charts(charts, starts=None):
+        asked.append(starts)
+        return ["new"] * len(charts)
+        yield
+
+    assert drain(mirrored_charts.mapped_anew([other, part], [(whole, known)], map_charts)) == ["new"] * 2
+    if not begins:
+        assert asked == [None]
+        return
+    ((nowhere, start),) = asked
+    assert nowhere is None and replace(start, uv=known.uv) == known
+    np.testing.assert_array_equal(start.uv, known.uv[used[order]])
+
+
+def test_charts_that_are_slit_or_closed_or_have_holes_filled_start_from_nothing():
+    """Slits touch themselves in the map that there was, what was closed has two places, and holes more vertices."""
+    V, F = meshes.grid(3, 3)
+    whole = chart_of(V, F)
+    inner = np.flatnonzero((F == 5).any(axis=1))
+    slit = F.copy()
+    slit[inner[:2]] = np.where(slit[inner[:2]] == 5, len(V), slit[inner[:2]])
+    opened = replace(whole, vertices=np.concatenate([V, V[5:6]]), triangles=slit)
+    rest = {name: getattr(whole, name)[1:] for name in ("triangles", "corners", "faces")}
+    half = replace(whole, patches=F[:1], **rest)
+    nowhere = mirrored_charts._where_they_lie
+    assert nowhere([opened], [(whole, flat_map(V))]) is None
+    assert nowhere([whole], [(opened, flat_map(opened.vertices))]) is None
+    assert nowhere([half], [(whole, flat_map(V))]) is None and nowhere([], [(whole, flat_map(V))]) is None
+    assert nowhere([whole], [(replace(whole, patches=F[:1]), flat_map(V))]) is None
 
 
 def test_what_maps_charts_is_asked_for_each_but_once():
     V, F = meshes.grid(2, 2)
     one, other, asked = chart_of(V, F), chart_of(V, F[:4]), []
 
-    def map_charts(charts):
-        asked.append(len(charts))
-        return [len(chart.triangles) for chart in charts]
+    def map_charts(charts, starts=None):
+        asked.append((len(charts), starts))
+        return [flat_map(chart.vertices + len(chart.triangles)) for chart in charts]
         yield
 
     again = mirrored_charts.with_known_maps(map_charts)
-    assert [drain(again(charts)) for charts in ([one], [other, one], [other])] == [[8], [4, 8], [4]]
-    assert asked == [1, 1, 0]
+    found = [drain(again(charts)) for charts in ([one], [other, one], [other])]
+    assert [[int(m.uv.min()) for m in maps] for maps in found] == [[8], [4, 8], [4]]
+    assert [count for count, _ in asked] == [1, 1, 0]
+    # What is told where to start does so.
+    assert all(starts is None for _, starts in asked)
+    third = replace(other, corners=other.corners + 100)
+    drain(again([third, one], ["here", "there"]))
+    assert asked[3] == (1, ["here"])
 
 
 @pytest.mark.parametrize("hole", [0, 2])

@@ -282,7 +282,8 @@ def alone(monkeypatch):
     """Charts that are mapped one by one, those of the same size as if they were equal; the numbers of them."""
     asked = []
 
-    def map_one(self, chart):
+    def map_one(self, chart, start):
+        assert start is None
         asked.append(int(chart.faces[0] // 8))
         return done(mapped(len(asked)), 0.0, 1.0)
 

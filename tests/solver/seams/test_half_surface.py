@@ -11,8 +11,10 @@ from short_cuts import component_of
 from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane
 from omt_uv.solver.mesh.geometry import below_one, face_areas, vertex_normals
 from omt_uv.solver.mesh.topology import boundary_loops, halfedges, pair_keys, twins
+from omt_uv.solver.seams import search as searches
 from omt_uv.solver.seams.coarse_surface import _without_chords, half_coarsening
 from omt_uv.solver.seams.fine_paths import fine_mirror
+from omt_uv.solver.seams.search import SeamSearch
 
 X = np.array([1.0, 0, 0])
 
@@ -144,6 +146,25 @@ def test_images_of_what_is_thin_are_on_the_same_side_of_it(seed):
     assert (facing[flat] > 0).mean() > 0.99
     nearest = cKDTree(component.positions).query(component.positions - 2 * mirror.height[:, None] * X)[1]
     assert ((N[nearest] * (N * [-1, 1, 1])).sum(axis=1)[flat] > 0).mean() < 0.95
+
+
+@pytest.mark.parametrize(("width", "alike"), [(0.0, True), (0.3, True), (0.45, False)])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_where_one_side_has_a_limb_of_its_own_half_does_not_stand_for_both(width, alike, side, monkeypatch):
+    """A fin on one flank alone: that side is searched as it is, whichever is looked at first."""
+    V, F = bodies()["sphere"]
+    flank = np.array([0.8 * side, 0.6, 0])
+    off = np.arccos(np.clip(V @ flank, -1, 1))
+    V = V * (1 + 0.002 * np.sin(5 * V[:, 1:2] + V[:, :1]) + 0.6 * (np.maximum(1 - off / max(width, 1e-9), 0))[:, None])
+    component, _ = mirrored(V, F)
+    plane = SymmetryPlane(X, 0.0, 0.0, None)
+    mirror = fine_mirror(component, plane, V[component.vertex_ids], np.ones(len(V), dtype=bool))
+    assert not mirror.exact and mirror.alike == alike
+    asked = []
+    monkeypatch.setattr(searches, "half_coarsening", lambda *given: asked.append("half"))
+    mine = SeamSearch(np.zeros(1), None, None)
+    coarse, _ = mine._modelled(component, mirror)
+    assert asked == ["half"] * alike and coarse.images is None
 
 
 def test_scale_and_place_do_not_matter():
