@@ -239,9 +239,8 @@ def _chart_map(
 
 def no_map(chart: Chart, failure: MeshError) -> ChartMap:
     """What stands for the map of a chart that has none in double precision, until it is cut further."""
-    without = dict.fromkeys(("area_l1", "area_sd", "angle_mean"), np.inf)
-    uv, folds = np.zeros((len(chart.vertices), 2)), len(np.unique(chart.faces))
-    return ChartMap(uv=uv, status="failed", folds=folds, failure=failure, **without)
+    uv, folds, off = np.zeros((len(chart.vertices), 2)), len(np.unique(chart.faces)), np.inf
+    return ChartMap(uv=uv, status="failed", area_l1=off, area_sd=off, angle_mean=off, folds=folds, failure=failure)
 
 
 def _stages(uv: np.ndarray, conformal, cells, figures: Distortion, log: RunLog, warnings: tuple[str, ...]) -> ChartMap:
