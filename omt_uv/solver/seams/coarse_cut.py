@@ -183,3 +183,10 @@ def _cost_factor(component: CutComponent) -> np.ndarray:
     ease = np.repeat(component.length[inner] ** 2 / np.maximum(component.cost[inner], 1e-300), 2)
     total = np.bincount(ends.ravel(), length, n)
     return np.where(total > 0, total / np.maximum(np.bincount(ends.ravel(), ease, n), 1e-300), 1.0)
+
+
+def spread_along(coarse: CoarseSurface, model: ScaleModel, ends: np.ndarray) -> float:
+    """The spread that a coarse surface is predicted to have, cut along edges with these ends (k,2,3)."""
+    cut = np.unique(cKDTree(coarse.positions).query(ends.reshape(-1, 3))[1])
+    cut = cut[~coarse.boundary[cut]]
+    return float(model.cut(cut[:1]).spread_cut(cut[1:]))

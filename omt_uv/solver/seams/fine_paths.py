@@ -34,8 +34,8 @@ FEWER_STEPS = 2.0
 WIDER = (8.0, 64.0, np.inf)
 
 
-# Share of the vertices that have an image in a component with a mirror plane, in a scan with one, and where half of one
-# stands for the other: a raised arm would have the seams of one that hangs.
+# Share of the vertices that have an image in a component with a mirror plane, in a scan with one, and in one whose half
+# surely stands for both: a raised arm would have the seams of one that hangs.
 MIRRORED_SHARE = (0.97, 0.9, 0.95)
 # Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
 EXACT = 1e-4
@@ -46,7 +46,7 @@ NEARLY = 0.03
 class FineMirror:
     """The mirror image (n,) of every vertex of a component, its height (n,) over the plane, the normal (3,) of that,
     and which lie in it or on a line of edges along it, (n,) bool; exact: whether images are vertices, nearly all, and
-    no such line is needed; alike: whether one half stands for both."""
+    no such line is needed; alike: whether one half surely stands for both; halved: whether one is searched for both."""
 
     image: np.ndarray
     height: np.ndarray
@@ -54,6 +54,7 @@ class FineMirror:
     plane: np.ndarray
     exact: bool
     alike: bool = True
+    halved: bool = True
 
     @property
     def side(self) -> np.ndarray:

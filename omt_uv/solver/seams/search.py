@@ -12,14 +12,13 @@ from functools import partial
 from itertools import islice
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..analysis.seam_costs import SeamCosts
 from ..analysis.symmetry_plane import NEAR
 from ..cutting.component import CutComponent, TurnedCopies, fingerprint
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
-from .coarse_cut import CoarseCut, Found, Setting, best_of, hub
+from .coarse_cut import CoarseCut, Found, Setting, best_of, hub, spread_along
 from .coarse_surface import Coarsening, CoarseSurface, HalfSurface, coarsening, half_coarsening
 from .cut_tree import Cut, Task, cut_along
 from .fine_paths import FineMirror, fine_mirror, with_line
@@ -36,6 +35,8 @@ from .symmetric_base import symmetric_base
 DEARER = (1.5, 1.0)
 # Share of the vertices in the plane that cuts have to be able to reach so that exactly symmetric ones are tried.
 PARTLY = 0.5
+# The spread that a cut leaves on the whole, over that on the half it was found on, where no limb is left without a cut.
+OF_BOTH = 3.0
 # Exactly symmetric seams may cost so many times what such along a line by the plane do, which miss a few edges.
 EXACTLY = 1.1
 # What a cut that was grown has to win by being made shorter, at most, as a rule a third of it.
@@ -238,12 +239,23 @@ class SeamSearch:
         self, component: CutComponent, base: np.ndarray, bound: float, mirror: FineMirror
     ) -> Steps[CoarseCut | None]:
         """The best symmetric cut; None where there is hardly one."""
-        trials = range(self._trials(component))
-        cuts = yield from part_of(self._several_grown(component, base, mirror, bound, trials), 0.0, GROWN)
+        trials, sure = range(self._trials(component)), mirror.alike or not mirror.halved
+        width = 1.0 if sure else 0.5
+        cuts = yield from part_of(self._several_grown(component, base, mirror, bound, trials), 0.0, width * GROWN)
         if not cuts:
             return None
-        best = yield from part_of(self._rehearsal(component).best_of(cuts, self.asked), GROWN, 0.2)
-        return (yield from part_of(self._shortened(best), GROWN + 0.2, 0.8 - GROWN))
+        choosing = self._rehearsal(component).best_of(cuts, self.asked)
+        best = yield from part_of(choosing, width * GROWN, width * 0.2)
+        best = yield from part_of(self._shortened(best), width * (GROWN + 0.2), width * (0.8 - GROWN))
+        if sure or self._holds_for_both(component, best):
+            return best
+        return (yield from part_of(self._symmetric(component, base, bound, replace(mirror, halved=False)), 0.5, 0.5))
+
+    def _holds_for_both(self, component: CutComponent, found: CoarseCut) -> bool:
+        """Whether a cut that was found on one half, and its image, leave about as much of the whole."""
+        coarse, model = self._modelled(component)
+        spread = spread_along(coarse, model, component.positions[component.ends[found.carried(component).edges]])
+        return spread <= OF_BOTH * max(found.cut.spread, found.task.bound)
 
     def _trials(self, component: CutComponent, finer: float = 1.0) -> int:
         """Coarse surfaces of so many times the vertices to be tried; what is small has one, itself."""
@@ -339,12 +351,10 @@ class SeamSearch:
 
     def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown anew on finer surfaces, the best of several."""
-        before = component.positions[np.unique(component.ends[found.edges])]
+        before = component.positions[component.ends[found.edges]]
 
         def bound(coarse: CoarseSurface, model: ScaleModel) -> float:
-            cut = np.unique(cKDTree(coarse.positions).query(before)[1])
-            cut = cut[~coarse.boundary[cut]]
-            return max(share * model.cut(cut[:1]).spread_cut(cut[1:]), FLAT)
+            return max(share * spread_along(coarse, model, before), FLAT)
 
         before_this = len(found.coarse.positions) / self.options.vertices
         finer = min(FINER * max(before_this, 1.0), FINEST)
@@ -397,7 +407,7 @@ class SeamSearch:
         """One of the coarse surfaces of a component, whose mirror plane stays a line, and its model."""
         line, count = None if mirror is None else mirror.plane, round(finer * self.options.vertices)
         parts, coarse = (component.positions, component.triangles, self.options.vertices), None
-        if mirror is not None and mirror.alike:
+        if mirror is not None and mirror.halved:
             seen = mirror.plane, mirror.image, mirror.height, mirror.normal
             half = self._begun(component, line, partial(half_coarsening, *parts, *seen))
             coarse = None if half is None else half.ended(count, trial)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from scripted_steps import told, worked
 from short_cuts import component_of
 
 from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane
 from omt_uv.solver.mesh.geometry import below_one, face_areas, vertex_normals
 from omt_uv.solver.mesh.topology import boundary_loops, halfedges, pair_keys, twins
 from omt_uv.solver.seams import search as searches
+from omt_uv.solver.seams.coarse_cut import spread_along
 from omt_uv.solver.seams.coarse_surface import _without_chords, half_coarsening
 from omt_uv.solver.seams.fine_paths import fine_mirror
 from omt_uv.solver.seams.search import SeamSearch
@@ -148,23 +153,73 @@ def test_images_of_what_is_thin_are_on_the_same_side_of_it(seed):
     assert ((N[nearest] * (N * [-1, 1, 1])).sum(axis=1)[flat] > 0).mean() < 0.95
 
 
+def with_fin(width, side, height=0.6):
+    """A sphere, no more than nearly symmetric, with a fin on one flank alone; its component, and mirror."""
+    V, F = bodies()["sphere"]
+    off = np.arccos(np.clip(V @ [0.8 * side, 0.6, 0], -1, 1))
+    V = V * (
+        1 + 0.002 * np.sin(5 * V[:, 1:2] + V[:, :1]) + height * (np.maximum(1 - off / max(width, 1e-9), 0))[:, None]
+    )
+    component = component_of(below_one(V)[0], F)
+    plane = SymmetryPlane(X, 0.0, 0.0, None)
+    return component, fine_mirror(component, plane, V[component.vertex_ids], np.ones(len(V), dtype=bool))
+
+
 @pytest.mark.parametrize(("width", "alike"), [(0.0, True), (0.3, True), (0.45, False)])
 @pytest.mark.parametrize("side", [-1, 1])
-def test_where_one_side_has_a_limb_of_its_own_half_does_not_stand_for_both(width, alike, side, monkeypatch):
-    """A fin on one flank alone: that side is searched as it is, whichever is looked at first."""
-    V, F = bodies()["sphere"]
-    flank = np.array([0.8 * side, 0.6, 0])
-    off = np.arccos(np.clip(V @ flank, -1, 1))
-    V = V * (1 + 0.002 * np.sin(5 * V[:, 1:2] + V[:, :1]) + 0.6 * (np.maximum(1 - off / max(width, 1e-9), 0))[:, None])
-    component, _ = mirrored(V, F)
-    plane = SymmetryPlane(X, 0.0, 0.0, None)
-    mirror = fine_mirror(component, plane, V[component.vertex_ids], np.ones(len(V), dtype=bool))
-    assert not mirror.exact and mirror.alike == alike
+def test_whether_halves_are_alike_is_in_doubt_where_one_has_a_limb_of_its_own(width, alike, side, monkeypatch):
+    component, mirror = with_fin(width, side)
+    assert not mirror.exact and mirror.halved and mirror.alike == alike
     asked = []
     monkeypatch.setattr(searches, "half_coarsening", lambda *given: asked.append("half"))
     mine = SeamSearch(np.zeros(1), None, None)
-    coarse, _ = mine._modelled(component, mirror)
-    assert asked == ["half"] * alike and coarse.images is None
+    for halved in (True, False):
+        coarse, _ = mine._modelled(component, replace(mirror, halved=halved))
+        assert coarse.images is None and asked == ["half"]
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_cut_holds_for_both_halves_that_leaves_about_as_much_of_the_whole(side):
+    component, _ = with_fin(0.45, side, 1.5)
+    mine, ends = SeamSearch(np.zeros(1), None, None), component.positions[component.ends]
+    far = np.linalg.norm(ends, axis=2).max(axis=1)
+    along = np.abs(ends[:, :, 2]).max(axis=1) < 0.03
+
+    def found(edges, left):
+        return SimpleNamespace(
+            cut=SimpleNamespace(spread=left),
+            task=SimpleNamespace(bound=0.0),
+            carried=lambda component: SimpleNamespace(edges=edges),
+        )
+
+    coarse, model = mine._modelled(component)
+    left = spread_along(coarse, model, ends[along])
+    assert left < model.spread / 20
+    assert mine._holds_for_both(component, found(along, left))
+    # The same cut without what of it goes to the tip of the fin.
+    assert not mine._holds_for_both(component, found(along & (far < 1.1 * np.median(far)), left))
+
+
+@pytest.mark.parametrize("alike", [True, False])
+@pytest.mark.parametrize("halved", [True, False])
+@pytest.mark.parametrize("holds", [True, False])
+def test_what_one_half_does_not_stand_for_is_searched_as_a_whole(alike, halved, holds, monkeypatch):
+    asked = []
+
+    def several(self, component, base, mirror, bound, trials):
+        asked.append(mirror.halved)
+        return worked([mirror.halved])
+
+    monkeypatch.setattr(SeamSearch, "_several_grown", several)
+    monkeypatch.setattr(SeamSearch, "_trials", lambda *_: 1)
+    monkeypatch.setattr(SeamSearch, "_rehearsal", lambda *_: SimpleNamespace(best_of=lambda cuts, _: worked(cuts[0])))
+    monkeypatch.setattr(SeamSearch, "_shortened", lambda self, found: worked(found))
+    monkeypatch.setattr(SeamSearch, "_holds_for_both", lambda self, component, found: holds)
+    mirror = replace(with_fin(0.3, 1)[1], alike=alike, halved=halved)
+    found, fractions = told(SeamSearch(np.zeros(1), None, None)._symmetric(None, None, 1.0, mirror))
+    again = halved and not alike and not holds
+    assert asked == [halved, False][: 1 + again] and found == asked[-1]
+    assert (np.diff(fractions) > -1e-9).all() and fractions[-1] <= 1
 
 
 def test_scale_and_place_do_not_matter():

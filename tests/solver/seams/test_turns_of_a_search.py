@@ -86,6 +86,7 @@ def best(monkeypatch):
 
 EXACT = SimpleNamespace(exact=True)
 NEAR = SimpleNamespace(exact=False)
+ALIKE = SimpleNamespace(alike=True)
 
 
 def test_without_a_mirror_the_best_of_several_surfaces_is_made_shorter(best):
@@ -154,7 +155,7 @@ def test_symmetric_cuts_are_the_best_of_several_made_shorter(count, monkeypatch)
         SeamSearch, "_rehearsal", lambda *_: SimpleNamespace(best_of=lambda cuts, asked: worked(cuts[-1]))
     )
     monkeypatch.setattr(SeamSearch, "_shortened", lambda self, found: worked(Cut("short " + found.name, 1.0)))
-    found, fractions = told(SeamSearch(np.zeros(1), None, None)._symmetric(None, None, 0.5, None))
+    found, fractions = told(SeamSearch(np.zeros(1), None, None)._symmetric(None, None, 0.5, ALIKE))
     assert found is None if not count else found.name == f"short {count - 1}"
     grown = 0.5
     assert fractions == pytest.approx([0, grown] + ([grown, grown + 0.2, grown + 0.2, 1.0] if count else []))
