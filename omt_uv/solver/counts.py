@@ -17,10 +17,10 @@ BYTES_OF_NUMBER = 8
 MOST_LEVELS = 32
 
 
-def check_memory(count: float, each: float, what: str, remedy: str = "Ask for fewer") -> None:
+def check_memory(count: float, each: float, what: str, advice: str = "Ask for fewer") -> None:
     """Raise CountError where `count` things of at least `each` bytes are more than the memory of this machine.
 
-    what : the things, with braces for their count, as the subject of a sentence in the singular
+    what : the things, with braces for their count, as the subject of a sentence in the singular; advice : what to do
 
     >>> check_memory(10, 100, "A mesh of about {} vertices")
     """
@@ -31,14 +31,15 @@ def check_memory(count: float, each: float, what: str, remedy: str = "Ask for fe
     if not count <= there / each:
         raise CountError(
             f"{what.format(f'{count:.3g}')} takes more memory to make than the {there / 1e9:.3g} GB of this machine",
-            remedy,
+            advice,
         )
 
 
-def check_pixels(width: int, height: int | None = None) -> None:
-    """Raise CountError for so many pixels across and, if not as many, down that this machine has no memory for them."""
-    pixels = float(width) * float(width if height is None else height)
-    check_memory(pixels, CHANNELS * BYTES_OF_NUMBER, "A picture of {} pixels", "Ask for a smaller one")
+def check_pixels(width: int, height: int) -> None:
+    """Raise CountError for so many pixels across and down that this machine has no memory for them."""
+    check_memory(
+        float(width) * float(height), CHANNELS * BYTES_OF_NUMBER, "A picture of {} pixels", "Ask for a smaller one"
+    )
 
 
 def quadrupled(levels: int) -> float:

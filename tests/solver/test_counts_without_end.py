@@ -94,8 +94,8 @@ def test_levels_of_a_modifier_without_end_end_where_quads_do(small_machine):
 def test_what_fits_is_not_refused(small_machine):
     check_memory(MACHINE // 8, 8, "{}")
     check_pixels(MACHINE // 24, 1)
-    check_pixels(6454)
-    for refused in (lambda: check_memory(MACHINE // 8 + 1, 8, "{}"), lambda: check_pixels(6455)):
+    check_pixels(6454, 6454)
+    for refused in (lambda: check_memory(MACHINE // 8 + 1, 8, "{}"), lambda: check_pixels(6455, 6455)):
         with pytest.raises(CountError):
             refused()
     with pytest.raises(CountError, match="nan of them"):

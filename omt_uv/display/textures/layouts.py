@@ -34,7 +34,7 @@ def layout_picture(objects: Sequence[Placed], kind: str, size: int) -> np.ndarra
     MeshError : there is no face, more pixels than this machine has memory for, or, but for normals, see
         `solver.maps.distortion.distortion`
     """
-    check_pixels(size * SAMPLES)
+    check_pixels(size * SAMPLES, size * SAMPLES)
     found = triangles_of([item.reading for item in objects])
     if kind == "normals":
         colours = np.concatenate([_lit_faces(item) for item in objects])
@@ -52,7 +52,7 @@ def layout_picture(objects: Sequence[Placed], kind: str, size: int) -> np.ndarra
 def cells_picture(diagram: Diagram, size: int) -> np.ndarray:
     """The cells (size,size,3) in [0,1], top row first, in tints with their sides; of the sphere the half in front.
     Raises CountError for more than this machine has memory for."""
-    check_pixels(size * SAMPLES)
+    check_pixels(size * SAMPLES, size * SAMPLES)
     points = diagram.points
     triangles, owner = diagram.cells.fans()
     on_sphere = diagram.cells.points.shape[1] == 3

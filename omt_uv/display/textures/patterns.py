@@ -20,7 +20,7 @@ OUTLINE = np.array([0.23, 0.23, 0.23])
 def picture_of(kind: str, size: int) -> np.ndarray:
     """The picture (h,w,3) in [0,1], top row first, of "checker", "circles" or "world", so many pixels wide.
     Raises CountError for more than this machine has memory for."""
-    check_pixels(size * SAMPLES)
+    check_pixels(size * SAMPLES, size * SAMPLES)
     return {"checker": labelled_checker, "circles": circle_packing, "world": world_map}[kind](size)
 
 
