@@ -41,22 +41,33 @@ SCENES = Scenes()
 says = SCENES.says
 # What is said, but not as a warning: parts of errors, remedies, and names of ways.
 NO_WARNINGS = {
-    ("solver/analysis/joint_density.py", "or take the factors"): "a remedy",
     ("solver/analysis/joint_density.py", "The regions cannot have"): "an error",
+    ("solver/analysis/joint_density.py", "or take the factors"): "a remedy",
     ("solver/canonical/markers.py", "Markers of corners"): "an error",
+    ("solver/counts.py", "A picture of {} pixels"): "an error",
+    ("solver/counts.py", "Ask for a smaller one"): "a remedy",
+    ("solver/counts.py", "Ask for fewer"): "a remedy",
     ("solver/errors.py", " ({} {}: {})"): "elements of an error",
-    ("solver/errors.py", "{} across a seam"): "said by `test_every_warning` of the pipelines",
     ("solver/errors.py", "apply one level"): "said by `test_every_warning` of the pipelines",
+    ("solver/errors.py", "{} across a seam"): "said by `test_every_warning` of the pipelines",
+    ("solver/flows/domain.py", "A wall of {} samples"): "an error",
+    ("solver/flows/paths.py", "A path of {} places"): "an error",
     ("solver/maps/distortion.py", "The area of the faces"): "an error",
+    ("solver/maps/overlap.py", "A measure by {} samples"): "an error",
     ("solver/mesh/charts.py", "surface of genus"): "an error",
     ("solver/mesh/closed_surface.py", "Fill the holes, or take"): "a remedy",
     ("solver/mesh/closed_surface.py", "Only bodies without handles"): "a remedy",
     ("solver/mesh/closed_surface.py", "Only closed surfaces without handles"): "a remedy",
     ("solver/parameterization/chart_map.py", "Cut this part further"): "a remedy",
+    ("solver/partition/division.py", "A division into {} cells"): "an error",
+    ("solver/signatures/marked.py", "A signature of {} points"): "an error",
     ("solver/signatures/marked.py", "Mark one vertex"): "a remedy",
     ("solver/signatures/marked.py", "Nothing is farther"): "an error",
+    ("solver/signatures/signature.py", "A signature of {} points"): "an error",
     ("solver/sphere/conformal.py", "as it is"): "a way of a map",
     ("solver/sphere/moser_flow.py", "points left"): "an error",
+    ("solver/subdivision/catmull_clark.py", "A subdivided mesh of about {} quads"): "an error",
+    ("solver/subdivision/catmull_clark.py", "Ask for fewer levels"): "a remedy",
 }
 # Those of `test_every_warning_of_new_meshes`.
 ELSEWHERE = ("solver/remeshing/", "solver/sphere/sphere_map.py", "solver/volumes/", "solver/registration/")
