@@ -356,14 +356,16 @@ def _is_flat(chart: Chart) -> bool:
 
 
 def mapped_anew(
-    charts: list[Chart], known: list[tuple[Chart, ChartMap]], map_charts: MapCharts
+    charts: list[Chart], known: list[tuple[Chart, ChartMap]], map_charts: MapCharts, starts: Starts = None
 ) -> Steps[list[ChartMap]]:
-    """Maps of the charts; those that are as known ones were have the maps of these, and parts of them start there."""
+    """Maps of the charts; those that are as known ones were have the maps of these, and others start from the starts
+    given, or, without any, where they lie in what is known."""
     maps = {identity(chart): (chart, chart_map) for chart, chart_map in known}
     names = [identity(chart) for chart in charts]
-    others = [chart for chart, name in zip(charts, names, strict=True) if name not in maps]
-    starts = _where_they_lie(others, known)
-    new = yield from map_charts(others) if starts is None else map_charts(others, starts)
+    rows = [k for k, name in enumerate(names) if name not in maps]
+    others = [charts[k] for k in rows]
+    begun = _where_they_lie(others, known) if starts is None else [starts[k] for k in rows]
+    new = yield from map_charts(others) if begun is None else map_charts(others, begun)
     rest = iter(new)
     return [
         _numbered_as(chart, *maps[name]) if name in maps else next(rest)
@@ -401,14 +403,8 @@ def with_known_maps(map_charts: MapCharts) -> MapCharts:
     """What maps charts, which gives for one that is as another was the map of that: see `mapped_anew`."""
     known: list[tuple[Chart, ChartMap]] = []
 
-    def again(charts: list[Chart], starts: list[ChartMap] | None = None) -> Steps[list[ChartMap]]:
-        begun = {} if starts is None else {identity(c): start for c, start in zip(charts, starts, strict=True)}
-
-        def others(charts: list[Chart], parts: Starts = None) -> Steps[list[ChartMap]]:
-            own = [begun.get(identity(chart)) for chart in charts] if begun else parts
-            return map_charts(charts) if own is None else map_charts(charts, own)
-
-        maps = yield from mapped_anew(charts, known, others)
+    def again(charts: list[Chart], starts: Starts = None) -> Steps[list[ChartMap]]:
+        maps = yield from mapped_anew(charts, known, map_charts, starts)
         known.extend(zip(charts, maps, strict=True))
         return maps
 
