@@ -106,3 +106,36 @@ def test_a_line_that_blender_would_lose_behind_a_mark_is_not_lost(tmp_path, line
         assert check_header(path) is None
     path.write_text(f"{line}\n")
     assert check_header(path) is None
+
+
+TEXTS = {
+    ".obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    ".ply": "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
+    ".stl": "solid a\nfacet normal 0 0 1\nouter loop\nendloop\nendfacet\nendsolid a\n",
+    ".gltf": '{\n\t"asset": {"version": "2.0"}}',
+    ".off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+}
+
+
+@pytest.mark.parametrize("suffix", TEXTS)
+def test_a_text_that_is_no_utf_8_is_refused_by_the_name_of_its_encoding(tmp_path, suffix):
+    path = tmp_path / f"a{suffix.upper()}"
+    for name in ("utf-16", "utf-32"):
+        for order in ("-le", "-be"):
+            for text in (TEXTS[suffix], "\ufeff" + TEXTS[suffix]):
+                with pytest.raises(ValueError, match=rf"a text in {name.upper()}.*Save it as UTF-8"):
+                    holds(path, text.encode(name + order))
+    if suffix == ".obj":
+        with pytest.raises(ValueError, match="UTF-16"):
+            holds(path, "# Модель\n".encode("utf-16"))
+    holds(path, TEXTS[suffix].encode())
+    with pytest.raises(ValueError, match=r"byte order mark.*without one"):
+        holds(path, TEXTS[suffix].encode("utf-8-sig"))
+
+
+def test_numbers_are_no_text_of_another_encoding(tmp_path):
+    # A file of numbers may have anything before them.
+    for begin in ("\ufeffabc".encode("utf-16-le"), "by a program".encode("utf-16-le"), b"\xff\xfe\0\0", b""):
+        assert holds(tmp_path / "a.stl", begin.ljust(80, b"\0") + struct.pack("<I", 1) + bytes(50)) == 1
+    assert holds(tmp_path / "a.off", b"") is None and holds(tmp_path / "a.obj", b"\0" * 99) is None
+    assert holds(tmp_path / "a.obj", "# Модель\nv 0 0 0\n".encode()) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import re
 import struct
@@ -18,7 +19,18 @@ MOST_HEADER = 1 << 20
 STL_HEADER = 84
 STL_FACE = 50
 # What an editor may put before a text in UTF-8, and the lines of an OBJ file of which none may be lost.
-MARK = b"\xef\xbb\xbf"
+MARK = codecs.BOM_UTF8
+# Encodings that Windows has for texts beside it, and their marks; two bytes of one are those of another.
+OTHERS = (
+    ("utf-32-le", codecs.BOM_UTF32_LE),
+    ("utf-32-be", codecs.BOM_UTF32_BE),
+    ("utf-16-le", codecs.BOM_UTF16_LE),
+    ("utf-16-be", codecs.BOM_UTF16_BE),
+)
+# How the texts of formats begin.
+BEGINS = {".obj": "", ".ply": "ply", ".stl": "solid", ".gltf": "{", ".off": ("OFF", "COFF")}
+# Bytes that tell an encoding.
+ENOUGH = 64
 NUMBERED = (b"v", b"vt", b"vn", b"f", b"l", b"p")
 
 
@@ -27,18 +39,33 @@ def check_header(path: Path) -> int | None:
 
     Raises
     ------
-    ValueError : the file is too short for what it declares, or its first line would be lost. Faces of PLY may be as
-        short as their count of vertices, so that files that were cut off pass, and have fewer faces than they declare
+    ValueError : the file is too short for what it declares, or a text in an encoding of which nothing, or not its
+        first line, would be read. Faces of PLY may be as short as their count of vertices, so that files that were cut
+        off pass, and have fewer faces than they declare
     """
-    if path.suffix.lower() == ".gltf":
-        _gltf(path)
-        return None
-    check = {".ply": _ply, ".stl": _stl, ".glb": _glb, ".obj": _obj}.get(path.suffix.lower())
-    if check is None:
+    suffix = path.suffix.lower()
+    if suffix not in BEGINS and suffix != ".glb":
         return None
     with path.open("rb") as file:
         begin = file.read(MOST_HEADER)
-    return check(begin, path.stat().st_size)
+    if suffix in BEGINS:
+        _check_encoding(begin[:ENOUGH], suffix)
+    if suffix == ".gltf":
+        _gltf(path)
+    check = {".ply": _ply, ".stl": _stl, ".glb": _glb, ".obj": _obj}.get(suffix)
+    return None if check is None else check(begin, path.stat().st_size)
+
+
+def _check_encoding(begin: bytes, suffix: str) -> None:
+    """Raise ValueError for a text in UTF-16 or UTF-32, with its mark or without, and for one behind a mark of UTF-8."""
+    for name, mark in OTHERS:
+        text = begin.removeprefix(mark).decode(name, "ignore")
+        is_marked = begin.startswith(mark) or (text != "" and text.isascii() and "\0" not in text)
+        if is_marked and text.lstrip().startswith(BEGINS[suffix]):
+            raise ValueError(f"it is a text in {name[:6].upper()}, which is not read. Save it as UTF-8.")
+    text = begin.removeprefix(MARK).decode("latin-1")
+    if suffix != ".obj" and begin.startswith(MARK) and text.lstrip().startswith(BEGINS[suffix]):
+        raise ValueError("it begins with a byte order mark, and would not be read. Save it as UTF-8 without one.")
 
 
 def _too_short(text: str) -> ValueError:
