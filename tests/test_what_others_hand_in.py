@@ -19,8 +19,8 @@ import omt_uv
 from omt_uv import supervision
 from omt_uv.batch import engine, plan, pool, servant
 from omt_uv.files.formats import off
-from omt_uv.pipelines import remesh
 from omt_uv.pipelines.shapes import signature_index
+from omt_uv.solver import counts
 from omt_uv.solver.errors import CountError
 
 ROOT = Path(omt_uv.__file__).parent
@@ -171,19 +171,19 @@ def most_vertices() -> float:
     while high - low > 1e-6 * high:
         middle = (low + high) / 2
         try:
-            remesh._check_memory(middle)
+            counts.check_vertices(middle)
             low = middle
         except CountError:
             high = middle
     for none in (np.inf, np.nan):
         with pytest.raises(CountError):
-            remesh._check_memory(none)
-    return low * remesh.BYTES_PER_VERTEX
+            counts.check_vertices(none)
+    return low * counts.BYTES_PER_VERTEX
 
 
 SYSTEM = {"batch.pool.free_memory": pool.free_memory}
 # Of the solver, and who asks it.
-ASKED = {"pipelines.remesh._check_memory": most_vertices}
+ASKED = {"solver.counts.check_vertices": most_vertices}
 
 
 def test_every_place_that_asks_the_system_has_a_scene():

@@ -20,7 +20,7 @@ from ..solver.analysis.feature_edges import edge_union, resolved_features
 from ..solver.analysis.occlusion import hidden_sides, looks_out
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.contact.self_intersections import intersecting_pairs
-from ..solver.counts import BYTES_PER_VERTEX, check_memory
+from ..solver.counts import check_vertices, real
 from ..solver.errors import CountError, DensityError, MeshError, plural, reaching
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import Gluing, orientations
@@ -131,27 +131,28 @@ def _crossings(
 def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -> tuple[str, list[int]]:
     """What is counted, and the count of every level."""
     first, count_of = settings.count, settings.count_of
-    if not (np.isfinite(first) and first > 0):
-        raise CountError(f"A remesh with {count_of} {first:g} is none", "Give a number above 0")
+    if not 0 < first < np.inf:
+        raise CountError(f"A remesh with {count_of} {real(first):g} is none", "Give a number above 0")
     if not 0 < settings.ratio < 1 and settings.levels > 1:
         raise CountError(f"Levels cannot each have {settings.ratio:g} times the count", "Give a ratio between 0 and 1")
     if count_of == "edge":
         # A triangle with three edges of length L has the area sqrt(3) L^2 / 4; faces are even in number where closed.
         area = face_areas(surface.positions, triangles).sum()
         # Floats of Python overflow to infinity without a word, which is too many as well.
-        faces = float(area) / (3**0.5 / 4) / first / first
-        _check_memory(faces / 2)
+        faces = float(area) / (3**0.5 / 4) / real(first) / real(first)
+        check_vertices(faces / 2)
         first, count_of = 2 * max(round(faces / 2), 1), "faces"
-    _check_memory(first if count_of == "vertices" else first / 2)
+    check_vertices(real(first) if count_of == "vertices" else real(first) / 2)
+    last = settings.levels - 1
+    if last > 0 and round(first * settings.ratio ** real(last)) < 1:
+        raise CountError(
+            f"The last of {real(settings.levels):g} levels would have no {count_of}",
+            "Ask for fewer levels, or give a ratio nearer to 1",
+        )
     counts = [round(first * settings.ratio**k) for k in range(max(settings.levels, 1))]
     if count_of == "faces":
         counts = [counts[0], *(c + c % 2 for c in counts[1:])]
     return count_of, counts
-
-
-def _check_memory(vertex_count: float) -> None:
-    """Raise CountError for so many vertices that this machine cannot hold them."""
-    check_memory(vertex_count, BYTES_PER_VERTEX, "A mesh of about {} vertices", "Ask for fewer, or for longer edges")
 
 
 def _features(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 
 from .errors import CountError
@@ -17,6 +18,18 @@ BYTES_OF_NUMBER = 8
 MOST_LEVELS = 32
 
 
+def real(count: float) -> float:
+    """A count as a float: integers of Python have no limit, and too large ones become infinite, as floats do.
+
+    >>> real(3), real(10**400), real(-(10**400))
+    (3.0, inf, -inf)
+    """
+    try:
+        return float(count)
+    except OverflowError:
+        return math.inf if count > 0 else -math.inf
+
+
 def check_memory(count: float, each: float, what: str, advice: str = "Ask for fewer") -> None:
     """Raise CountError where `count` things of at least `each` bytes are more than the memory of this machine.
 
@@ -27,7 +40,8 @@ def check_memory(count: float, each: float, what: str, advice: str = "Ask for fe
     if not hasattr(os, "sysconf"):
         return
     there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    # Integers of Python have no limit, floats overflow to infinity, and what is no number is not below either.
+    count = real(count)
+    # What is no number is not below either.
     if not count <= there / each:
         raise CountError(
             f"{what.format(f'{count:.3g}')} takes more memory to make than the {there / 1e9:.3g} GB of this machine",
@@ -35,10 +49,15 @@ def check_memory(count: float, each: float, what: str, advice: str = "Ask for fe
         )
 
 
+def check_vertices(count: float) -> None:
+    """Raise CountError for a new mesh of so many vertices that this machine has no memory for it."""
+    check_memory(count, BYTES_PER_VERTEX, "A mesh of about {} vertices", "Ask for fewer, or for longer edges")
+
+
 def check_pixels(width: int, height: int) -> None:
     """Raise CountError for so many pixels across and down that this machine has no memory for them."""
     check_memory(
-        float(width) * float(height), CHANNELS * BYTES_OF_NUMBER, "A picture of {} pixels", "Ask for a smaller one"
+        real(width) * real(height), CHANNELS * BYTES_OF_NUMBER, "A picture of {} pixels", "Ask for a smaller one"
     )
 
 

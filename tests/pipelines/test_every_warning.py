@@ -36,8 +36,6 @@ NO_WARNINGS = {
     ("pipelines/regions/several.py", "Several regions of existing"): "an error",
     ("pipelines/regions/several.py", "No island has both"): "an error",
     ("pipelines/shapes/distance.py", "{} vertices are marked"): "an error",
-    ("pipelines/remesh.py", "A mesh of about {} vertices"): "an error",
-    ("pipelines/remesh.py", "Ask for fewer, or for longer edges"): "a remedy",
 }
 MERGING = "merging vertices that coincide"
 DISSOLVE = "dissolve faces without area"

@@ -75,6 +75,25 @@ def test_counts_that_are_none_are_refused(settings):
         series(*meshes.icosphere(1), **settings)
 
 
+@pytest.mark.parametrize("count_of", ["vertices", "faces", "edge"])
+def test_counts_that_no_float_has_are_refused_as_others(count_of):
+    huge = 10**400
+    given = {"count_of": count_of, "count": 1e-300 if count_of == "edge" else huge}
+    with pytest.raises(CountError, match=r"memory.*fewer, or for longer edges"):
+        series(*meshes.icosphere(1), **given)
+    with pytest.raises(CountError, match="is none"):
+        series(*meshes.icosphere(1), count_of=count_of, count=-huge)
+
+
+@pytest.mark.parametrize("levels", [8, 10**9, 10**400])
+def test_levels_without_a_vertex_are_refused_before_the_first_is_made(levels):
+    with pytest.raises(CountError, match=r"^The last of \S+ levels would have no vertices"):
+        series(*meshes.icosphere(2), count=40, levels=levels, ratio=0.5)
+    surface = triangle_surface(*meshes.icosphere(1))
+    seven = RemeshSettings(count_of="vertices", count=40, levels=7, ratio=0.5)
+    assert remeshing._counts(surface, surface.triangles, seven)[1] == [40, 20, 10, 5, 2, 1, 1]
+
+
 @pytest.mark.parametrize("ratio", [-1.0, 0.0, 1.0, 2.0, np.nan])
 def test_what_one_level_does_not_use_refuses_nothing(ratio):
     V, F = meshes.icosphere(2)

@@ -74,7 +74,7 @@ def small_machine(monkeypatch):
     monkeypatch.setattr(os, "sysconf", {"SC_PAGE_SIZE": 1, "SC_PHYS_PAGES": MACHINE}.__getitem__, raising=False)
 
 
-@pytest.mark.parametrize("count", [10**9, np.int64(10**9), 10**18], ids=["int", "int64", "large"])
+@pytest.mark.parametrize("count", [10**9, np.int64(10**9), 10**18, 10**400], ids=["int", "int64", "large", "no float"])
 @pytest.mark.parametrize("function", TAKES)
 def test_a_count_without_end_is_refused_before_memory_is_asked_for(function, count, small_machine):
     tracemalloc.start()

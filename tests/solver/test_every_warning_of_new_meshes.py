@@ -34,7 +34,6 @@ NO_WARNINGS = {
     ("solver/remeshing/components/components.py", ", mapped apart"): "taken out of what others say",
     ("solver/remeshing/components/components.py", ", remeshed apart"): "said of what others say",
     ("solver/remeshing/remesh_surface.py", "{} {} are too few"): "an error",
-    ("solver/remeshing/remesh_surface.py", "A mesh of about {} vertices"): "an error",
     ("solver/volumes/envelope.py", "A body of about {} tetrahedra"): "an error",
     ("solver/volumes/meshing.py", "A body of about {} tetrahedra"): "an error",
     ("solver/volumes/sampling.py", "An index of about {} places"): "an error",

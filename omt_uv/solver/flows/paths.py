@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..counts import BYTES_OF_NUMBER, check_memory
+from ..counts import BYTES_OF_NUMBER, check_memory, real
 from ..mesh.geometry import nearest_rotations
 from .options import BLEND, RADIUS, RIGID, STRAIGHT
 
@@ -31,7 +31,7 @@ def handle_paths(
     ValueError : an unknown kind
     CountError : more samples than this machine has memory for
     """
-    check_memory(float(samples) * max(len(start), 1), BYTES_OF_NUMBER * start.shape[1], "A path of {} places")
+    check_memory(real(samples) * max(len(start), 1), BYTES_OF_NUMBER * start.shape[1], "A path of {} places")
     times = np.linspace(0.0, 1.0, samples + 1)
     straight = start + times[:, None, None] * (end - start)
     path = straight.copy()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.density import graded_density
-from ..counts import BYTES_PER_VERTEX, check_memory
+from ..counts import check_vertices, real
 from ..errors import CountError, positive_density
 from ..progress import Progress, Steps, part_of
 from .components.components import Component
@@ -71,7 +71,7 @@ def remesh(
     DensityError : a density that is not positive and finite
     """
     yield Progress("Parts", 0.0)
-    check_memory(count if options.counts_vertices else count / 2, BYTES_PER_VERTEX, "A mesh of about {} vertices")
+    check_vertices(real(count) if options.counts_vertices else real(count) / 2)
     level = _checked_density(density, len(source.triangles))
     with source.frame.named():
         return (yield from _in_frame(source, count, options, source.frame.density(level)))

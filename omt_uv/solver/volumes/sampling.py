@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..counts import BYTES_PER_ELEMENT, check_memory, quadrupled
+from ..counts import BYTES_PER_ELEMENT, check_memory, quadrupled, real
 from .shells import icosphere
 from .transfer import TetLocation
 
@@ -16,7 +16,7 @@ from .transfer import TetLocation
 def ball_index(levels: int, shells: int) -> np.ndarray:
     """Places (s,3) in the unit ball, shell after shell from the middle, each on the 20 * 4^levels faces of an
     icosahedron. Raises CountError for more than this machine has memory for."""
-    check_memory(20 * shells * quadrupled(levels), BYTES_PER_ELEMENT, "An index of about {} places")
+    check_memory(20 * real(shells) * quadrupled(levels), BYTES_PER_ELEMENT, "An index of about {} places")
     vertices, triangles = icosphere(levels)
     centre = vertices[triangles].mean(axis=1)
     centre /= np.linalg.norm(centre, axis=1)[:, None]
