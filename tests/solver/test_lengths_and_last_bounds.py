@@ -30,7 +30,7 @@ def test_a_loop_costs_its_length_and_the_turns_between_its_sides(count):
         assert closed_price(positions, given) == pytest.approx(price)
 
 
-@pytest.mark.parametrize("size", [1e-100, 1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e-100, 1e-6, 1.0, 1e6, 1e200, 1e300])
 def test_landmarks_are_one_by_a_share_of_the_size_of_the_surface(size):
     apart = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0]]) * size
     for off, refused in ((SAME / 2, True), (2 * SAME, False)):

@@ -86,9 +86,11 @@ def check_landmarks(landmarks: Landmarks, source: np.ndarray, target: np.ndarray
     for points, name in ((source, "source"), (target, "target")):
         if len(points) < 2:
             continue
+        # Squares of lengths of any size are within floats by a power of two, which rounds nothing.
+        points = np.ldexp(points, -np.frexp(np.abs(points).max())[1])
         apart = np.linalg.norm(points[:, None] - points, axis=2) + np.diag(np.full(len(points), np.inf))
         a, b = np.unravel_index(apart.argmin(), apart.shape)
-        if apart[a, b] <= SAME * max(float(np.abs(points).max()), 1e-300):
+        if apart[a, b] <= SAME * float(np.abs(points).max()):
             pair = f"{landmarks.name(int(a))} and {landmarks.name(int(b))}"
             raise LandmarkError(f"Landmarks {pair} are the same point of the {name}")
 
