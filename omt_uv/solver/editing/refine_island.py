@@ -18,7 +18,7 @@ from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements
 from ..maps.untangle import count_folds
 from ..mesh.geometry import face_areas, signed_areas
-from ..mesh.topology import boundary_edges, boundary_loops, halfedges
+from ..mesh.topology import boundary_edges, boundary_loops, euler_characteristic, halfedges
 from ..progress import Progress, Steps
 from ..refinement.boundary_barrier import make_barrier
 from ..refinement.continuation import ContinuationResult, MapProblem, minimise_in_stages
@@ -193,9 +193,8 @@ def _parted(w: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> np.nd
 
 def _straightened(vertices, triangles, uv) -> np.ndarray | None:
     """An embedding (n,2) in a disk, near uv where that is possible; None for a surface with handles."""
-    loops = boundary_loops(triangles)
-    n = len(vertices)
-    euler = n - (3 * len(triangles) + sum(map(len, loops))) // 2 + len(triangles)
+    n, loops = len(vertices), boundary_loops(triangles)
+    euler = euler_characteristic(n, len(triangles), sum(map(len, loops)))
     if not loops or euler + len(loops) != 2:
         return None
     outer = int(np.argmax([signed_area_of(uv[loop]) for loop in loops]))

@@ -20,7 +20,16 @@ from ..errors import (
 )
 from .gluing import Gluing, components, corner_classes
 from .surface import Surface, strict_gluing
-from .topology import boundary_loops, distinct, first_places, graph_components, halfedges, order_of_pairs, pair_keys
+from .topology import (
+    boundary_loops,
+    distinct,
+    euler_characteristic,
+    first_places,
+    graph_components,
+    halfedges,
+    order_of_pairs,
+    pair_keys,
+)
 
 
 @dataclass(frozen=True)
@@ -231,8 +240,7 @@ def check_disk(chart: Chart) -> None:
     """Raise NotADiskError unless the chart, holes filled, is connected to one boundary without handles."""
     loops = boundary_loops(chart.disk)
     n, m, b = len(chart.vertices), len(chart.disk), sum(len(loop) for loop in loops)
-    euler = n - (3 * m + b) // 2 + m
-    handles = (2 - euler - len(loops)) // 2
+    handles = (2 - euler_characteristic(n, m, b) - len(loops)) // 2
     faces = np.unique(chart.faces)
     if not loops:
         shape = "sphere" if handles == 0 else f"surface of genus {handles}"

@@ -219,6 +219,15 @@ def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     return np.column_stack([tail[boundary], head[boundary]])
 
 
+def euler_characteristic(n: int, m: int, b: int) -> int:
+    """Vertices - edges + triangles of a manifold of n vertices and m triangles, with b edges on boundaries.
+
+    >>> euler_characteristic(4, 4, 0), euler_characteristic(4, 2, 4)
+    (2, 1)
+    """
+    return n - (3 * m + b) // 2 + m
+
+
 def vertices_around(triangles: np.ndarray, chosen: np.ndarray, n: int, rings: int) -> np.ndarray:
     """Vertices (n,) bool at most `rings` edges away from the chosen triangles, (m,) bool, of (m,3)."""
     near = np.zeros(n, dtype=bool)

@@ -21,6 +21,7 @@ from ..mesh.geometry import (
 )
 from ..mesh.topology import (
     boundary_edges,
+    euler_characteristic,
     graph_components,
     halfedges,
     next_halfedge,
@@ -275,8 +276,7 @@ def _largest(triangles: np.ndarray, n: int) -> np.ndarray:
 
 def _euler(triangles: np.ndarray) -> int:
     """Euler's number of a manifold."""
-    edges = (3 * len(triangles) + len(boundary_edges(triangles))) // 2
-    return len(np.unique(triangles)) - edges + len(triangles)
+    return euler_characteristic(len(np.unique(triangles)), len(triangles), len(boundary_edges(triangles)))
 
 
 def _without_chords(triangles: np.ndarray, plane: np.ndarray) -> np.ndarray | None:

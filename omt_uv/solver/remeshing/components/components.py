@@ -15,7 +15,7 @@ from ...mesh.geometry import bounding_box, face_areas
 from ...mesh.gluing import orientations, turn_over
 from ...mesh.repair import repaired_gluing
 from ...mesh.surface import chosen_triangles, triangle_surface
-from ...mesh.topology import halfedges, pair_keys, twins
+from ...mesh.topology import euler_characteristic, halfedges, pair_keys, twins
 from .coincident_boundaries import join_coincident
 
 
@@ -52,8 +52,7 @@ class Component:
     @property
     def euler(self) -> int:
         """Euler characteristic: vertices - edges + triangles."""
-        edges = (3 * len(self.triangles) + len(self.boundary_edges)) // 2
-        return len(self.vertices) - edges + len(self.triangles)
+        return euler_characteristic(len(self.vertices), len(self.triangles), len(self.boundary_edges))
 
     @property
     def has_lines(self) -> bool:
