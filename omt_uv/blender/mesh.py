@@ -6,7 +6,7 @@ but the corners it is told to.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -181,6 +181,12 @@ def read_pinned(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
     if attribute is None or attribute.domain != "CORNER" or attribute.data_type != "BOOLEAN":
         return np.zeros(len(mesh.loops), bool)
     return _get(attribute.data, "value", len(mesh.loops), bool)
+
+
+def one_for_each_mesh(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The first of the objects of each mesh data-block, in their order."""
+    first = {obj.data: obj for obj in reversed(objects)}
+    return [obj for obj in objects if first[obj.data] == obj]
 
 
 def linked(obj: bpy.types.Object) -> str:

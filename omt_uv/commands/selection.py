@@ -52,7 +52,7 @@ def read_plain_file(options: argparse.Namespace) -> tuple[PlainObj, Reading] | N
 
 def read_file(options: argparse.Namespace, layer: str = "") -> list:
     """Pairs of object and Reading of a UV layer (the active one by default) of the chosen meshes with faces."""
-    from ..blender.mesh import read, weld_split_vertices
+    from ..blender.mesh import one_for_each_mesh, read, weld_split_vertices
     from ..files.loaded import compare
     from ..files.meshes import load
     from ..pipelines.reading import Y_UP
@@ -60,9 +60,9 @@ def read_file(options: argparse.Namespace, layer: str = "") -> list:
     path = options.input
     objects = load(path)
     _tell(options, compare(path, objects))
-    unique = {obj.data: obj for obj in reversed(_chosen(options, objects))}
+    unique = one_for_each_mesh(_chosen(options, objects))
     pairs = []
-    for obj in reversed(unique.values()):
+    for obj in unique:
         with refusals(name=obj.name):
             reading = read(obj, layer)
         if path.suffix.lower() in Y_IS_UP:

@@ -43,13 +43,14 @@ def mesh_objects(context: bpy.types.Context, shared: bool = False) -> list[bpy.t
     ------
     Complaint : there is none
     """
+    from ..blender.mesh import one_for_each_mesh
+
     if context.mode == "EDIT_MESH":
         objects = list(context.objects_in_mode_unique_data)
     else:
         objects = [obj for obj in context.selected_objects if obj.type == "MESH"]
     objects.sort(key=lambda obj: obj != context.view_layer.objects.active)
-    first = {obj.data: obj for obj in reversed(objects)}
-    unique = objects if shared else [obj for obj in objects if first[obj.data] == obj]
+    unique = objects if shared else one_for_each_mesh(objects)
     if not unique:
         raise Complaint("No mesh is selected. Select one or more mesh objects.")
     return unique

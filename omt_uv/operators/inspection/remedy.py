@@ -64,13 +64,15 @@ class UV_OT_omt_remedy(QuickOperator, bpy.types.Operator):
 
 def _objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Those that the result is about, as far as they are in this view layer, one for each mesh."""
+    from ...blender.mesh import one_for_each_mesh
+
     summary = last_run.state.summary
     names = summary.objects if summary is not None else ()
     found = [obj for obj in map(context.view_layer.objects.get, names) if obj is not None and obj.type == "MESH"]
     found = found or last_run.chosen_objects(context)
     if not found:
         raise Complaint("The objects of the last run are gone. Select one or more mesh objects.")
-    return list({obj.data: obj for obj in found}.values())
+    return one_for_each_mesh(found)
 
 
 class UV_OT_omt_notices(bpy.types.Operator):
