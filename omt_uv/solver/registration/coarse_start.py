@@ -154,7 +154,8 @@ def _polished(case: Case, mesh: FewVertices, domain: np.ndarray, met: np.ndarray
     if not met.all():
         placed, met = put_landmarks(problem, placed, mesh.landmarks, case.targets)
     each = problem.energies(placed)
-    distortion = float((each / (1 + each / (SATURATION * face_areas(reference, mesh.triangles)))).sum())
+    half, has_area = SATURATION * face_areas(reference, mesh.triangles), np.isfinite(each)
+    distortion = float((each[has_area] / (1 + each[has_area] / half[has_area])).sum() + half[~has_area].sum())
     return _Trial(placed, met, replace(problem, within=None).energy(placed), distortion, steps)
 
 

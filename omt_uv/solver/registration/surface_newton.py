@@ -25,6 +25,8 @@ from .carriers import Carrier, InPlace, TargetCarrier
 MAX_HALVINGS = 10
 # Rounds in which vertices at folds take their step back.
 RESTORING = 30
+# Energy of a face, on surfaces of area 1, from which it has no area: rounding may leave it some.
+NO_AREA = 1e8
 # Weight of the distortion in the domain next to that on the surface: enough to keep folds away.
 BARRIER = 1e-2
 # Predicted decrease over energy at which a stage of drawing is left, and the last one.
@@ -68,7 +70,8 @@ class Deformation:
     """What is minimised: faces of the reference, how they are summed, where vertices move, which (n,) bool stay.
 
     features: functions to be kept, and within: the faces in the domain as they were at first, whose distortion there is
-    a barrier against folds; both of a carrier that is a surface.
+    a barrier against folds; both of a carrier that is a surface. left_out: faces (m,) bool that do not count, since no
+    derivative tells a face without area where to go.
     """
 
     faces: Elements
@@ -78,6 +81,7 @@ class Deformation:
     area_weight: float
     features: Features | None = None
     within: Elements | None = None
+    left_out: np.ndarray | None = None
 
     @property
     def surface(self) -> TargetCarrier:
@@ -92,8 +96,9 @@ class Deformation:
         return energies_of(self.faces, *derivatives(self.faces, corner), self.area_weight)
 
     def energy(self, placed: InPlace) -> float:
-        """Their sum, that of the features, and the barrier."""
-        value = float(self.energies(placed).sum())
+        """Their sum without those left out, that of the features, and the barrier."""
+        each = self.energies(placed)
+        value = float((each if self.left_out is None else each[~self.left_out]).sum())
         if self.features is not None:
             value += self.features.energy(placed, self.surface.triangles)
         if self.within is not None:
@@ -136,10 +141,16 @@ def frames(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
 def minimise_on(
     problem: Deformation, placed: InPlace, most: int, tolerance: float, stage: str
 ) -> Steps[tuple[InPlace, int]]:
-    """Newton steps, at most so many, until the predicted decrease is below the tolerance times the energy."""
+    """Newton steps, at most so many, until the predicted decrease is below the tolerance times the energy.
+
+    Faces without area on the carrier, as along a straight edge of it, move with their neighbours until they have one.
+    """
     value = problem.energy(placed)
     for k in range(most):
         yield Progress(stage, k / most)
+        if problem.left_out is not None or not value < NO_AREA:
+            problem = replace(problem, left_out=~(problem.energies(placed) < NO_AREA))
+            value = problem.energy(placed)
         found = _step(problem, placed, value)
         if found is None:
             return placed, k
@@ -188,7 +199,7 @@ def _direction(problem: Deformation, placed: InPlace) -> tuple[np.ndarray, float
     n = len(placed.positions)
     axes = problem.carrier.axes(placed)
     axes[problem.held] = 0
-    own = _local(problem.faces, placed.positions, axes, problem.area_weight)
+    own = _local(problem.faces, placed.positions, axes, problem.area_weight, problem.left_out)
     blocks, slope, gradient, scale = own.blocks, own.slope, own.gradient, own.scale
     diagonal = np.full((n, 2), SHIFT * scale)
     if problem.carrier.round:
@@ -197,7 +208,7 @@ def _direction(problem: Deformation, placed: InPlace) -> tuple[np.ndarray, float
     parts = [own]
     if problem.within is not None:
         pushed = problem.surface.pushed(placed, axes)
-        parts.append(_local(problem.within, in_space(placed.domain), pushed, problem.area_weight))
+        parts.append(_local(problem.within, in_space(placed.domain), pushed, problem.area_weight, None))
         blocks = blocks + BARRIER * parts[1].blocks
         slope = slope + BARRIER * parts[1].slope
     if problem.features is not None:
@@ -214,9 +225,10 @@ def _direction(problem: Deformation, placed: InPlace) -> tuple[np.ndarray, float
 @dataclass(frozen=True)
 class _Local:
     """Derivatives of the energy of triangles: blocks (m,6,6), slope (2n,) along the tangents, gradient (n,3), mean of
-    the diagonal; and what it takes to tell where a step folds them."""
+    the diagonal; and what it takes to tell where a step folds them, none of those left out (m,) bool."""
 
     faces: Elements
+    left_out: np.ndarray | None
     corner: np.ndarray
     turn: np.ndarray
     blocks: np.ndarray
@@ -228,16 +240,25 @@ class _Local:
         """Share (m,) of a step (n,2) along the tangents at which each triangle has no area, to first order."""
         change = np.einsum("mkfa,mka->mkf", self.turn, along[self.faces.triangles])
         moved = derivatives(self.faces, change[..., 0] + 1j * change[..., 1])
-        return fold_shares(*derivatives(self.faces, self.corner), *moved)
+        return fold_shares(*_kept(*derivatives(self.faces, self.corner), self.left_out), *moved)
 
 
-def _local(faces: Elements, positions: np.ndarray, axes: np.ndarray, area_weight: float) -> _Local:
-    """Derivatives for positions (n,3) that move along tangents (n,2,3)."""
+def _kept(a: np.ndarray, b: np.ndarray, left_out: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives (m,), (m,) complex of a map, those of faces that are left out (m,) bool as if nothing moved."""
+    return (a, b) if left_out is None else (np.where(left_out, 1, a), np.where(left_out, 0, b))
+
+
+def _local(
+    faces: Elements, positions: np.ndarray, axes: np.ndarray, area_weight: float, left_out: np.ndarray | None
+) -> _Local:
+    """Derivatives for positions (n,3) that move along tangents (n,2,3), 0 of what is left out (m,) bool."""
     triangles, n = faces.triangles, len(positions)
     frame, corner = frames(positions, triangles)
-    local = derivatives_of(faces, *derivatives(faces, corner), area_weight, 1.0)
+    local = derivatives_of(faces, *_kept(*derivatives(faces, corner), left_out), area_weight, 1.0)
     # How the tangents of the corners lie in the planes of the faces: (m, corner, frame axis, tangent).
     turn = np.einsum("mfd,mkad->mkfa", frame, axes[triangles])
+    if left_out is not None:
+        turn, frame = (np.where(left_out.reshape(-1, *[1] * (x.ndim - 1)), 0, x) for x in (turn, frame))
     rows = local.rows.real[..., None] * turn[:, None, :, 0] - local.rows.imag[..., None] * turn[:, None, :, 1]
     rows = np.ascontiguousarray(rows.reshape(len(triangles), 4, 6))
     parts = np.stack([local.gradient.real, local.gradient.imag], axis=2)
@@ -245,6 +266,7 @@ def _local(faces: Elements, positions: np.ndarray, axes: np.ndarray, area_weight
     gradient = np.column_stack([np.bincount(triangles.ravel(), pull[:, d], n) for d in range(3)])
     return _Local(
         faces=faces,
+        left_out=left_out,
         corner=corner,
         turn=turn,
         blocks=np.matmul(rows.transpose(0, 2, 1), rows),

@@ -137,7 +137,8 @@ def straighten_around(
 
     The faces (m,3) are to keep the shapes of the reference (n,3) and the area (m,).
     """
-    target = np.maximum(area, 1e-9 * np.median(area))
+    # Where most faces have no area, as of vertices that were put in one place, the mean has one, or any will do.
+    target = np.maximum(area, 1e-9 * (np.median(area) or area.mean() or 1.0))
     inside = free[triangles].any(axis=1)
     vertices, small = np.unique(triangles[inside], return_inverse=True)
     # Newton eliminates unknowns as they come.

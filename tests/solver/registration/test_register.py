@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from meshes import bumpy, icosphere, torus
+from meshes import bumpy, cube, grid, hinge, icosphere, subdivide, torus
 from sphere_shapes import blob, random_rotation
 
 from omt_uv.solver.errors import (
@@ -22,6 +22,11 @@ from omt_uv.solver.registration import register as registering
 from omt_uv.solver.registration.domains import domain_map, filled
 from omt_uv.solver.registration.register import register
 from omt_uv.solver.registration.results import stretches
+
+TETRAHEDRON = (
+    np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
+    np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]),
+)
 
 
 def shape():
@@ -181,3 +186,18 @@ def test_how_far_landmarks_are_off_is_a_share_of_the_target_however_long_the_sou
     monkeypatch.setattr(registering, "_polished", shifted)
     found = match((V, F), (W, G), (chosen, name[chosen]))
     np.testing.assert_allclose(found.residuals, 1e-3, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "source, target",
+    [(icosphere(2), grid(6, 6)), (subdivide(*cube()), TETRAHEDRON), (blob(3, seed=1), hinge())],
+    ids=["square", "tetrahedron", "hinge"],
+)
+def test_what_corresponds_to_few_places_or_to_straight_edges_is_matched(source, target):
+    # Functional maps of bodies without a shape of their own may put all vertices in a few places, and faces whose
+    # corners lie along an edge have no area.
+    (V, F), (W, G) = source, target
+    with np.errstate(divide="raise", invalid="raise", over="raise"):
+        found = match((np.asarray(V, float), F), (W, G))
+    assert found.flipped == 0
+    assert all(np.isfinite(x).all() for x in (found.stretches, found.forward.positions(W, G)))
