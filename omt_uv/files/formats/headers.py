@@ -28,7 +28,7 @@ OTHERS = (
     ("utf-16-be", codecs.BOM_UTF16_BE),
 )
 # How the texts of formats begin.
-BEGINS = {".obj": "", ".ply": "ply", ".stl": "solid", ".gltf": "{", ".off": ("OFF", "COFF")}
+BEGINS = {".obj": ("",), ".ply": ("ply",), ".stl": ("solid",), ".gltf": ("{",), ".off": ("OFF", "COFF")}
 # Bytes that tell an encoding.
 ENOUGH = 64
 NUMBERED = (b"v", b"vt", b"vn", b"f", b"l", b"p")
