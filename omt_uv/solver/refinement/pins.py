@@ -44,7 +44,7 @@ def check_pins(vertices: np.ndarray, places: np.ndarray, n: int) -> Pins:
         raise PinError("Pinned UVs are not finite", kind="vertex", elements=wrong)
     both = np.unique(np.column_stack([vertices, places]), axis=0)
     vertices, places = both[:, 0].astype(np.int64), both[:, 1:]
-    again = vertices[1:][vertices[1:] == vertices[:-1]]
+    again = np.unique(vertices[1:][vertices[1:] == vertices[:-1]])
     if len(again):
         raise PinError("A vertex is pinned to two places", kind="vertex", elements=again)
     _, first, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)

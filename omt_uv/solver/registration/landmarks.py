@@ -75,7 +75,7 @@ def _points(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[np.
     order = np.argsort(triangles.ravel(), kind="stable")
     found = np.minimum(np.searchsorted(triangles.ravel(), vertices, sorter=order), len(order) - 1)
     corner = order[found]
-    wrong = vertices[triangles.ravel()[corner] != vertices]
+    wrong = np.unique(vertices[triangles.ravel()[corner] != vertices])
     if len(wrong):
         raise LandmarkError(f"Landmarks of the {name} are at vertices without faces", "", "vertex", wrong)
     return corner // 3, np.eye(3)[corner % 3]
