@@ -219,3 +219,32 @@ def test_only_what_was_taken_apart_and_its_faces_are_looked_at_again(mended, men
     assert calls[2] == sorted(near - {1}) and np.flatnonzero(found.mended).tolist() == [0, 6]
     assert calls[3] == sorted({k for k, t in enumerate(F.tolist()) if near & set(t)} | {16, 17})
     assert found.pairs == "pairs" and found.positions[5] == pytest.approx(2 * V[5] + 101)
+
+
+@pytest.mark.parametrize("meeting", [False, True])
+@pytest.mark.parametrize("left", [0, 2, 3, 4])
+def test_regions_are_brought_back_where_fewer_pairs_are_left_and_stay_where_as_many_are(left, meeting, monkeypatch):
+    """What was found stays, and is told, where nothing is gained; what meets nothing is not brought at all."""
+    V, F = meshes.icosphere(1)
+    pairs = np.arange(6).reshape(-1, 2)
+    rows = np.unique(F[pairs]) if meeting else np.setdiff1d(np.arange(len(V)), F[pairs])
+    region, asked = SimpleNamespace(rows=rows[:5]), []
+
+    def closer(given, apart, restored):
+        asked.append(given)
+        np.testing.assert_array_equal(np.stack([apart, restored]), np.stack([V, 2 * V])[:, given.rows])
+        return 0 * apart + 7
+
+    monkeypatch.setattr(shapes, "closer", closer)
+    others, concerned = np.arange(2 * left).reshape(-1, 2), np.ones(len(F), bool)
+    given = SimpleNamespace(triangles=F, _apart=lambda at, some: others)
+    move, found = (V, 2 * V), (3 * V, pairs)
+    mended, told = shapes.FlowShape._brought(given, move, [region], found, concerned)
+    assert asked == [region] * meeting
+    if left < len(pairs):
+        expected = 3 * V
+        expected[rows[:5] if meeting else []] = 7
+        np.testing.assert_array_equal(mended, expected)
+        assert told is others
+    else:
+        assert mended is found[0] and told is pairs

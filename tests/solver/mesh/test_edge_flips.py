@@ -78,3 +78,33 @@ def test_flips_until_none_end_at_delaunay():
     assert flips and ended
     np.testing.assert_array_equal(twin, twins(G))
     assert (signed_areas(uv, G) > 0).all() and (excess(np.flatnonzero(twin >= 0)) >= 0).all()
+
+
+def glued(seed, count=12):
+    """Opposite halfedges of triangles that are glued to one another in any way, two of them to themselves, as around
+    the tips of cones, and a number for each of their edges, the worst of all within a triangle."""
+    rng = np.random.default_rng(seed)
+    ends = np.vstack([[[0, 1], [5, 3]], rng.permutation(np.r_[2, 4, 6 : 3 * count - 2]).reshape(-1, 2)])
+    twin = np.full(3 * count, -1)
+    twin[ends[:, 0]], twin[ends[:, 1]] = ends[:, 1], ends[:, 0]
+    edges = np.flatnonzero(twin > np.arange(len(twin)))
+    score = dict(zip(edges.tolist(), rng.normal(size=len(edges)) - 0.5, strict=True))
+    return twin, {**score, 0: -9.0, 3: -8.0}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rounds_flip_the_worst_edges_of_their_triangles_and_none_within_one(seed):
+    twin, score = glued(seed)
+    inside = {h for h in score if h // 3 == twin[h] // 3}
+    flipped = []
+
+    def flip(several):
+        wanted = {h for h, x in score.items() if x < 0} - inside
+        rivals = {h: [g for g in wanted if {h // 3, twin[h] // 3} & {g // 3, twin[g] // 3}] for h in wanted}
+        assert set(several.tolist()) == {h for h in wanted if score[h] == min(score[g] for g in rivals[h])}
+        flipped.extend(several.tolist())
+        score.update(dict.fromkeys(several.tolist(), 1.0))
+
+    found = flip_until_none(twin, lambda some: np.array([score[h] for h in some.tolist()]), flip, 100)
+    assert found == (len(flipped), True) and flipped
+    assert {0, 3} <= {h for h in score if score[h] < 0} <= inside

@@ -22,7 +22,7 @@ def test_the_cheapest_patches_that_a_chart_can_spare(seed):
     assert (paid / np.maximum(gain, 1))[mine].max() <= (paid / np.maximum(gain, 1))[left].min()
 
 
-def two_darts(spare):
+def two_darts(spare, area_weight=(10.0, 10.0)):
     """Two quads, each of which is a dart in the map, in charts of their own: the patches, and the map."""
     quad = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     dart = np.array([0, 1, 0.3 + 0.3j, 1j])
@@ -33,7 +33,7 @@ def two_darts(spare):
         triangles=np.concatenate([triangles, triangles + 4]),
         polygon=np.repeat([0, 1], 2),
         target=np.full(4, 0.5),
-        area_weight=np.full(2, 10.0),
+        area_weight=np.asarray(area_weight),
         chart=np.repeat([0, 1], 2),
         spare=np.asarray(spare, float),
     )
@@ -53,6 +53,19 @@ def test_darts_become_convex_each_as_if_it_were_alone():
     found = patches.convexified(w)
     assert not corners.reflex(found).any()
     np.testing.assert_allclose(found[4:] - found[4], found[:4] - found[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("weights", [(0.3, 60.0), (60.0, 0.3)])
+def test_every_chart_has_a_weight_of_its_own(weights):
+    """Where all weights are one, whose they are is not seen. How many rounds there are, all decide together."""
+    found = []
+    for pair in (weights, weights[:1] * 2, weights[1:] * 2):
+        patches, _, w = two_darts([np.inf, np.inf], pair)
+        found.append(patches._stepped(w, patches.area_weight, patches._barrier(w, patches.strength)))
+    found, first, second = found
+    np.testing.assert_allclose(found[:4], first[:4], atol=2e-4)
+    np.testing.assert_allclose(found[4:], second[4:], atol=2e-4)
+    assert np.abs(first - second).reshape(2, 4).max(axis=1).min() > 2e-2
 
 
 def test_charts_that_can_spare_no_area_stay_to_the_bit():
