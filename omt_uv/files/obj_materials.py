@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,8 +33,9 @@ def place_materials(made: Path, target: Path, companions: dict[Path, Path]) -> l
     if place.name != target.with_suffix(".mtl").name:
         told = [f"{target.with_suffix('.mtl').name} holds other materials and was left alone; {place.name} has these"]
     check_length(place)
-    text = text.replace(b"mtllib " + materials.name.encode(), b"mtllib " + place.name.encode(), 1)
-    made.write_bytes(text)
+    # The name may be in a remark before it, too.
+    line = rb"(?m)^mtllib " + re.escape(materials.name.encode()) + rb"(?=\r?$)"
+    made.write_bytes(re.sub(line, lambda _: b"mtllib " + place.name.encode(), text, count=1))
     companions[materials] = place
     return told
 

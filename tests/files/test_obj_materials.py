@@ -22,7 +22,20 @@ def test_materials_take_the_name_of_their_file(tmp_path):
     made, companions = made_in(tmp_path), {}
     assert place_materials(made, tmp_path / "out.obj", companions) == []
     assert companions == {tmp_path / "tmp.mtl": tmp_path / "out.mtl"}
-    assert b"mtllib out.mtl\n" in made.read_bytes() and made.read_bytes().count(b"tmp.mtl") == 1
+    assert made.read_bytes() == b"# mtllib tmp.mtl\nmtllib out.mtl\nv 0 0 0\n"
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+@pytest.mark.parametrize("name", ["out", "tmp", r"a\1b (c)"])
+def test_the_line_that_names_materials_is_renamed_and_no_other(tmp_path, name, end):
+    """Neither a remark, nor an object or a group of that name."""
+    made, companions = made_in(tmp_path), {}
+    (tmp_path / "to").mkdir()
+    lines = [b"# tmp.mtl", b"mtllib tmp.mtl.mtl", b"o tmp.mtl", b"mtllib tmp.mtl", b"g mtllib tmp.mtl", b"v 0 0 0"]
+    made.write_bytes(end.join(lines))
+    assert place_materials(made, tmp_path / "to" / f"{name}.obj", companions) == []
+    lines[3] = f"mtllib {name}.mtl".encode()
+    assert made.read_bytes() == end.join(lines)
 
 
 def test_what_others_have_written_stays_and_what_is_the_same_is_taken(tmp_path):

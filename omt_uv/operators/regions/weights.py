@@ -76,7 +76,6 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
 
         for obj, weights in result:
             write_group(obj, self.weight_group, weights)
-            obj.vertex_groups.active_index = obj.vertex_groups[self.weight_group].index
         # What is computed has no border that an artist drew: it gets so much denser, and no exact share, which soft
         # weights of half a surface reach by densities that shear far too much.
         context.window_manager.operator_properties_last("uv.omt_magnify").exact = False
