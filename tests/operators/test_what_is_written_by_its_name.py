@@ -1,5 +1,5 @@
-"""What an operator writes by a name is the same whether there is something of that name or not, wherever it stands among
-others; it is the active one then, and the others stay as they were and where they were."""
+"""What an operator writes by a name is the same whether there is something of that name or not, wherever it stands; it
+is the active one then, and others stay as they were and where they were."""
 
 from __future__ import annotations
 
