@@ -53,6 +53,20 @@ def test_radius_paths_turn_about_the_middle_and_blends_lie_between():
         handle_paths(start, end, owner, "round", 2, MIDDLE, 4.0)
 
 
+@pytest.mark.parametrize("kind", [RADIUS, BLEND])
+def test_what_comes_from_the_middle_or_goes_there_goes_straight(kind):
+    """There is no direction to turn from, nor to; others beside it turn as they do alone."""
+    rng = np.random.default_rng(2)
+    middle, ends = rng.normal(size=3), rng.normal(size=(4, 3))
+    start, end = np.stack([middle, ends[0], ends[1], middle]), np.stack([ends[2], middle, ends[3], middle])
+    path = handle_paths(start, end, np.arange(4), kind, 6, middle, 9.0)
+    straight = handle_paths(start, end, np.arange(4), STRAIGHT, 6, middle, 9.0)
+    np.testing.assert_allclose(path[:, [0, 1, 3]], straight[:, [0, 1, 3]], atol=1e-12)
+    alone = handle_paths(start[2:3], end[2:3], np.arange(1), kind, 6, middle, 9.0)
+    np.testing.assert_allclose(path[:, 2:3], alone, atol=1e-12)
+    assert np.abs(path[3, 2] - straight[3, 2]).max() > 1e-2
+
+
 def test_handles_are_thinned_out_evenly_and_checked():
     rng = np.random.default_rng(0)
     cloud = rng.uniform(size=(400, 3))

@@ -16,6 +16,7 @@ from omt_uv.solver.mesh.closest_point import (
     subdivision_centroids,
 )
 from omt_uv.solver.mesh.geometry import face_areas, vertex_normals
+from omt_uv.solver.mesh.topology import twins
 
 
 def distances(V, F, points):
@@ -87,6 +88,29 @@ def test_the_side_that_looks_the_right_way_answers():
     for direction, height in ((1.0, 0.0), (-1.0, 0.1)):
         found = index(query, np.array([[0, 0, direction]]))
         assert found.points[0, 2] == pytest.approx(height)
+
+
+@pytest.mark.parametrize("first", range(0, 32, 5))
+def test_walks_enter_every_triangle_whatever_its_number(first):
+    V, F = meshes.grid(4, 4)
+    F = np.roll(F, -first, axis=0)
+    inner = np.flatnonzero(twins(F) >= 0)
+    here, beside = inner // 3, twins(F)[inner] // 3
+    found = ClosestPoint(V, F, 0.1).walk(V[F[here]].mean(axis=1) + [0, 0, 0.05], beside)
+    np.testing.assert_array_equal(found.faces, here)
+    assert set(here.tolist()) == set(range(len(F)))
+
+
+@pytest.mark.parametrize("depth", [0.0, 1e-6, 0.02])
+def test_on_the_wrong_side_of_a_thin_part_the_right_one_answers(depth):
+    """However near the wrong one is: next to what is tried it is no distance."""
+    V, F = meshes.grid(3, 3)
+    both = np.vstack([V, V + [0, 0, 0.05]])
+    index = ClosestPoint(both, np.vstack([F[:, ::-1], F + len(V)]), 0.05)
+    points = V[F].mean(axis=1) + [0, 0, depth]
+    found = index(points, np.tile([0.0, 0, 1], (len(points), 1)), 2000)
+    assert (found.faces >= len(F)).all()
+    np.testing.assert_allclose(found.points, points * [1, 1, 0] + [0, 0, 0.05], atol=1e-12)
 
 
 def test_a_tracker_follows_small_steps():

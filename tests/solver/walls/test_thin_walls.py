@@ -56,6 +56,20 @@ def test_both_sides_of_a_wall_come_apart_and_its_border_stays_with_one(name, thi
     assert one[0] != other[0] and part.max() == 1 and border[0] in (one[0], other[0])
 
 
+@pytest.mark.parametrize("name", ["half a sphere", "cap"])
+@pytest.mark.parametrize("inside_out", [False, True])
+def test_the_border_of_a_wall_stays_with_its_larger_side(name, inside_out):
+    """Whichever side has the lower numbers."""
+    V, F = OPEN[name]
+    V, F = thickened(V, F[:, ::-1] if inside_out else F, 0.05)
+    pair, length = inner_edges(V, F)
+    part = parts(F, pair, wall_edges(V, F, pair, length, np.zeros(len(pair), bool)))
+    count = len(OPEN[name][1])
+    area = face_areas(V, F)
+    larger = int(area[:count].sum() < area[count : 2 * count].sum())
+    assert set(part[2 * count :]) == {part[larger * count]} and part[0] != part[count]
+
+
 @pytest.mark.parametrize("name", OPEN)
 def test_where_it_lies_how_large_it_is_and_the_order_of_its_faces_do_not_matter(name):
     random = np.random.default_rng(3)

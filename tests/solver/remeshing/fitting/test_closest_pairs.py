@@ -57,6 +57,17 @@ def test_rows_name_the_pairs_of_faces_and_vertices(setting):
     assert np.abs(np.linalg.norm(on, axis=1) - 1).max() < 0.005
 
 
+@pytest.mark.parametrize("places", [PLACES, DENSE, DENSER])
+def test_other_places_of_a_triangle_begin_at_what_is_closest_to_the_nearest_of_those_there_are(setting, places):
+    """Triangle by triangle, and place by place within."""
+    _, pairing, _, Q, _ = setting
+    known = pairing.surface_faces.reshape(len(Q), -1)
+    found = pairing.surface_faces_for(places).reshape(len(Q), len(places))
+    for k, place in enumerate(places):
+        nearest = min(range(len(PLACES)), key=lambda r, at=place: np.linalg.norm(PLACES[r] - at))
+        np.testing.assert_array_equal(found[:, k], known[:, nearest])
+
+
 def test_places_are_inside_of_their_triangle():
     for places in (PLACES, DENSE, DENSER):
         np.testing.assert_allclose(places.sum(axis=1), 1)
