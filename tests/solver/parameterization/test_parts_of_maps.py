@@ -45,6 +45,15 @@ def chart_of(V, F, faces=None, ids=None):
     return Chart(V, F, np.arange(F.size).reshape(-1, 3), faces, ids)
 
 
+@dataclass(frozen=True)
+class FakePrepared:
+    """Charts with the cuts that made them."""
+
+    charts: list
+    found_cuts: Cuts
+    cuts: object = None
+
+
 def cuts_of(edges):
     """Cuts along edges, each of length 1."""
     edges = np.array(edges, np.int64).reshape(-1, 2)
@@ -630,6 +639,39 @@ def test_nothing_is_taken_back_where_nothing_has_slack():
     last = round_of([1], [1.1])
     search = SimpleNamespace(with_images=lambda charts, chosen: chosen)
     assert drain(shear_bound._taken_back(search, last, None, EarlyEnd())) is last
+
+
+@pytest.mark.parametrize("beside", [0.0, 3.0, 1e4])
+@pytest.mark.parametrize("faces", [None, [True, False, True]])
+def test_what_is_long_next_to_all_that_goes_into_the_texture_may_come_apart(faces, beside, monkeypatch):
+    """Faces that are not chosen are not in it; charts that were not cut, or by hand, stay."""
+    V = np.array([[0.0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 3, 0], [0, 3, 4.0]])
+    surface = triangle_surface(V, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]]))
+    chosen = np.ones(3, bool) if faces is None else np.array(faces)
+    whole = face_areas(V, surface.corner_vertex[surface.triangles])[chosen].sum() + beside
+    charts, asked = [chart_of(V, F) for F in np.array([[[0, 1, 2]], [[0, 2, 3]], [[0, 3, 4]]])], []
+    maps = [SimpleNamespace(uv=size * np.array([[0, 0], [1, 0], [1.0, 1]])) for size in (1.0, 4.0, 30.0)]
+
+    def cut(search, chart, chart_map, area, map_charts):
+        asked.append((chart, area))
+        yield from ()
+        return ([chart, chart], [chart_map, chart_map]), np.array([[7, 8]])
+
+    monkeypatch.setattr(pieces, "_pieces", cut)
+    monkeypatch.setattr(pieces, "is_marked", lambda surface, chart: False)
+    monkeypatch.setattr(pieces, "joined", lambda search, cuts, edges: edges)
+    search = SimpleNamespace(
+        surface=surface, faces=None if faces is None else chosen, shear=ShearBound(1.3, beside=beside)
+    )
+    prepared = FakePrepared(charts, cuts_of([[0, 1], [0, 3]]))
+    found, found_maps = drain(pieces.in_pieces(search, prepared, maps, None))
+    long = [k for k in range(3) if np.sqrt(2) * (1, 4, 30)[k] > pieces.COMPACT * np.sqrt(whole)]
+    assert [chart for chart, _ in asked] == [charts[k] for k in long]
+    assert [area for _, area in asked] == pytest.approx([whole] * len(long))
+    counts = [2 if k in long else 1 for k in range(3)]
+    assert found.charts == [chart for chart, count in zip(charts, counts, strict=True) for _ in range(count)]
+    assert found_maps == [one for one, count in zip(maps, counts, strict=True) for _ in range(count)]
+    assert found.cuts.tolist() == [[0, 1], [0, 3]] + [[7, 8]] * len(long)
 
 
 def test_maps_of_pieces_shear_less_in_the_mean_by_area():

@@ -153,3 +153,27 @@ def test_no_vertex_of_the_surface_is_a_sample_twice():
     found = state.pairing.samples.points
     assert min(asked) > 0 and len(found) == len(samples.points) + sum(asked)
     assert len(np.unique(found, axis=0)) == len(found)
+
+
+def test_what_stays_high_in_a_search_counts_for_less_the_next_time(monkeypatch):
+    """And what was lowered for as much as it is: the search goes on from where it helps to where it may."""
+    largest, gains = np.array([100.0, 99.0, 50.0, 98.0]), iter([[True, False], [False, False], [True, True]])
+    asked = []
+
+    def highest(state, now, high, gap, most):
+        asked.append(now)
+        assert high.tolist() == (now > max(peaks.HIGH, peaks.HIGHEST * now.max())).tolist()
+        return np.array([0, 3])
+
+    monkeypatch.setattr(peaks, "look_closer", lambda *given: None)
+    monkeypatch.setattr(peaks, "_highest", highest)
+    monkeypatch.setattr(peaks, "cut_patches", lambda *given: None)
+    monkeypatch.setattr(peaks, "search_randomly", lambda *given: np.array(next(gains)))
+    monkeypatch.setattr(peaks, "SEARCHES", 3)
+    pairs = SimpleNamespace(distance=largest, largest_distance=lambda m: largest)
+    state = SimpleNamespace(triangles=np.zeros((4, 3), int), points=np.zeros((5, 3)), pairs=lambda: pairs)
+    told = [step.fraction for step in peaks._search(state, pairs, 1.0)]
+    less = peaks.DEMOTION
+    expected = np.array([[1, 1, 1, 1], [1, 1, 1, less], [less, 1, 1, less**2]])
+    np.testing.assert_allclose(asked, largest * expected)
+    assert told == pytest.approx([0.5 + 0.5 * k / 3 for k in (1, 2, 3)])
