@@ -499,6 +499,7 @@ def test_weights_of_areas_grow_while_that_is_worth_it(errors, inner, asked, weig
         ([0.025, 0.022, 0.0199], 2, 2),
         # What does not fall, or not far enough, is not taken.
         ([0.025, 0.0251], 0, 1),
+        ([0.025, 0.025], 0, 1),
         ([0.025, 0.0249, 0.01], 0, 1),
         ([0.025, 0.0225, 0.0201, 0.0199], 3, 3),
     ],
