@@ -8,6 +8,7 @@ import bpy
 
 import command_runs
 import pytest
+import scenes
 import whole_file
 
 # UVs are those of the active layer.
@@ -89,3 +90,32 @@ def test_an_object_gets_among_others_what_it_gets_alone(run, rich, name, more):
         assert len(mine[0]) > 1000
         found = whole_file.changed(*mine, ("scenes/*",))
         assert not found, (letter, found[:40])
+
+
+@pytest.fixture(scope="module")
+def packed(package, tmp_path_factory):
+    """The same file as it is and compressed, with what commands take beside it."""
+    folder = tmp_path_factory.mktemp("packed")
+    scenes.open_empty()
+    obj = scenes.bump(4, 3)
+    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.8))
+    for name, compress in (("plain", False), ("packed", True)):
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"), compress=compress, copy=True)
+    (folder / "handles.json").write_text(json.dumps([{"object": obj.name, "vertices": [7], "move": [0, 0, 0.05]}]))
+    return folder
+
+
+@pytest.mark.parametrize("name", ["plain", "packed"])
+@pytest.mark.parametrize(
+    "words",
+    ["seams -o @ --max-shear 0", "weights -o @ --kind mean", "measure --attributes @", "stack -o @",
+     "partition -o @ --cells 3 --relax 0", "unwrap -o @ --quality draft --max-shear 0", "remesh -o @ --vertices 20",
+     "flow -o @ --handles handles.json"],
+    ids=lambda words: words.split()[0],
+)  # fmt: skip
+def test_what_was_compressed_stays_so_and_nothing_else_is(run, packed, tmp_path, words, name):
+    out = tmp_path / "out.blend"
+    command, *rest = ({"@": out, "handles.json": packed / "handles.json"}.get(word, word) for word in words.split())
+    status, _, err = run(command, packed / f"{name}.blend", *rest)
+    assert status == 0, err
+    assert out.read_bytes().startswith(b"BLENDER") == (name == "plain")

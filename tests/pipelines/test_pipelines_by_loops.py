@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -41,6 +42,7 @@ from omt_uv.solver.errors import FoldedUVError, LandmarkError, MeshError
 from omt_uv.solver.mesh.charts import Chart
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.chart_indices import ChartPins, CornerPins
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.progress import Progress, drain
 
 RNG = np.random.default_rng
@@ -694,3 +696,42 @@ def test_faces_without_area_change_nothing_of_which_faces_are_worst(figure, plac
     beside = np.insert(uv, place, uv[0, [0, 1, 0]], axis=0)
     (found,) = worst_faces([reading(W, flat, beside.reshape(-1, 2))], figure, 0.3)
     assert [k - (k > place) for k in found.tolist() if k != place] == plain.tolist() and len(plain)
+
+
+# ---- what lies beside, and what is pinned ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_every_surface_knows_how_much_the_others_have(count):
+    """Of polygons that are chosen; what is nowhere has none, and is refused in its turn."""
+    jobs, areas = [], []
+    for k in range(count):
+        V, F = meshes.bumpy(3 + k, 3)
+        chosen = RNG(k).random(len(F)) < 0.6
+        jobs.append(unwrap.UnwrapJob.of(reading((1 + k) * V, F, faces=chosen), None))
+        areas.append(sum(plain_area_3d((1 + k) * V[face]) for face in F[chosen]))
+    if count == 4:
+        jobs[2] = replace(jobs[2], surface=replace(jobs[2].surface, positions=np.full_like(V, np.nan)))
+        areas[2] = 0.0
+    found = unwrap._in_one_texture(jobs, UnwrapOptions(max_shear=1.5))
+    for k, options in enumerate(found):
+        assert options.beside == pytest.approx(sum(areas[:k] + areas[k + 1 :]))
+        assert options.max_shear == 1.5 and options.preferences.axes == jobs[k].axes
+
+
+def plain_area_3d(corners):
+    return np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])) / 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_corners_that_others_get_their_uvs_from_are_pinned_for_them_unless_they_are_themselves(seed):
+    rng = RNG(seed)
+    pinned, uv = rng.random(20) < 0.5, rng.random((20, 2))
+    corners, hosts = np.split(rng.permutation(20)[:12], 2)
+    found = unwrap._pins_of_hosts(CornerPins(pinned, uv), SimpleNamespace(corners=corners, hosts=hosts))
+    for corner in range(20):
+        mine = corners[hosts == corner]
+        by_other = len(mine) > 0 and pinned[mine[0]] and not pinned[corner]
+        assert found.pinned[corner] == (pinned[corner] or by_other)
+        np.testing.assert_array_equal(found.uv[corner], uv[mine[0]] if by_other else uv[corner])
+    assert unwrap._pins_of_hosts(None, SimpleNamespace(corners=corners, hosts=hosts)) is None
