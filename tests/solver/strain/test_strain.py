@@ -111,3 +111,37 @@ def test_scores_are_distances_over_deviations_of_others_that_are_not_too_small(c
         far = np.linalg.norm(found.aligned[k] - mean, axis=1)
         np.testing.assert_allclose(found.score[k], far / np.maximum(off, bound), rtol=1e-5)
     assert least > 5
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_a_vertex_that_weighs_as_much_as_several_counts_as_these(scaled):
+    """In the centre, the size, the turn, and what is least."""
+    rng = np.random.default_rng(3)
+    V, _ = icosphere(1)
+    times = np.where(V[:, 2] > 0.5, 7, rng.integers(1, 3, len(V)))
+    shapes = np.stack([(1 + k) * (V * [1, 1.4, 0.6] + 0.1 * rng.normal(size=V.shape)) + k for k in range(4)])
+    shapes = np.einsum("kij,knj->kni", [random_rotation(k) for k in range(4)], shapes)
+    one = mean_shape(shapes, times / 5, scaled)
+    several = mean_shape(np.repeat(shapes, times, axis=1), np.ones(times.sum()), scaled)
+    for name in ("mean", "aligned", "distance", "deviation", "score"):
+        value, other = getattr(one, name), getattr(several, name)
+        axis = 0 if name in ("mean", "deviation") else 1
+        np.testing.assert_allclose(np.repeat(value, times, axis=axis), other, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["sheared", "folded"])
+def test_a_region_has_the_figures_of_its_own_faces_alone(kind):
+    """As if there were no others; weights that are no whole faces count by their share of the area."""
+    V, F = bumpy(7, 6)
+    rng = np.random.default_rng(2)
+    image = V[:, :2] * [1, 1.5] + (0.3 if kind == "folded" else 0.03) * rng.normal(size=(len(V), 2))
+    chosen = rng.random(len(F)) < 0.4
+    whole = beltrami(V, F, image)
+    chosen &= whole.size < min(np.sort(whole.size)[-5], 0.9)
+    everything, region, half = region_strain(whole, {"some": chosen * 1.0, "half": 0.5 * chosen})
+    (alone,) = region_strain(beltrami(V, F[chosen], image), {})
+    assert region.mean == pytest.approx(alone.mean) and region.greatest == pytest.approx(alone.greatest)
+    np.testing.assert_allclose(region.histogram, alone.histogram)
+    assert half.mean == pytest.approx(region.mean) and half.share == pytest.approx(region.share / 2)
+    assert region.share == pytest.approx(whole.area[chosen].sum() / whole.area.sum())
+    assert region.greatest < everything.greatest <= 1 and everything.share == pytest.approx(1)
