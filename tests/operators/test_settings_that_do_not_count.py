@@ -110,30 +110,6 @@ def test_what_is_not_drawn_does_not_count(folder, capfd, run):
     assert not others or after(folder, capfd, name, objects, {**arguments, **others}) == plain, others
 
 
-# Of some states, settings that do not count, all of them: others would look as if they did.
-IDLE = {
-    ("uv.omt_unwrap", "boundary", "DISK"): {"aspect", "cut_further", "max_shear"},
-    ("uv.omt_unwrap", "boundary", "RECTANGLE"): {"cut_further", "max_shear"},
-    ("uv.omt_unwrap", "pack", True): {"aspect", "centre_group", "corner_group"},
-    ("uv.omt_unwrap", "pack", False): {"aspect", "centre_group", "corner_group", "margin", "pack_around",
-                                       "turn_to_fit"},
-    ("uv.omt_unwrap", "seams", "EXISTING"): {"aspect", "centre_group", "corner_group", "cut_further", "keep_free",
-                                             "max_shear"},
-    ("uv.omt_refine", "pack", True): set(),
-    ("uv.omt_refine", "pack", False): {"margin", "tile"},
-    ("uv.omt_refine", "keep_boundary", True): {"margin", "pack", "tile"},
-    ("uv.omt_sphere", "orientation", "AXES"): {"east_group", "image_layout", "meridian_group", "pole_group",
-                                               "weight_factor"},
-    ("uv.omt_sphere", "orientation", "GROUPS"): {"image_layout", "weight_factor"},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("state", "expected"), IDLE.items(), ids=[" ".join(map(str, state)) for state in IDLE])
-def test_what_does_not_count_is_not_drawn_as_if_it_did(package, state, expected):
-    name, key, value = state
-    assert set(idle(name, "Band", {key: value})) == expected
-
-
 @pytest.mark.parametrize(
     ("name", "objects", "arguments"),
     [

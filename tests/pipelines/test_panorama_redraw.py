@@ -82,3 +82,33 @@ def test_beyond_a_side_of_the_octahedral_square_it_goes_on_where_that_side_is_gl
         middle = np.where(at < 0, -0.5, np.where(at >= size, np.array(size) - 0.5, (np.array(size) - 1) / 2))
         found = _pixels(image, OCTAHEDRAL, i, j)
         np.testing.assert_array_equal(found, 2 * middle - at)
+
+
+def noise(rows, columns):
+    """A picture no column of which is as another one."""
+    return np.random.default_rng(1).random((rows, columns, 3))
+
+
+@pytest.mark.parametrize("source", ["equirect", "lambert"])
+@pytest.mark.parametrize("target", ["equirect", "lambert"])
+@pytest.mark.parametrize("turn", [1, 5, 12])
+def test_a_globe_that_is_turned_about_its_axis_is_redrawn_turned(source, target, turn):
+    """Where a picture ends it goes on from its other side."""
+    image = noise(12, 24)
+    plain, turned = (drain(redraw(picture, source, target)) for picture in (image, np.roll(image, turn, axis=1)))
+    np.testing.assert_allclose(turned, np.roll(plain, turn, axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize("source", ["equirect", "lambert", "octahedral", "sinusoidal"])
+@pytest.mark.parametrize("target", ["equirect", "lambert", "octahedral"])
+def test_a_globe_that_is_mirrored_is_redrawn_mirrored(source, target):
+    image = noise(16, 16)
+    plain, mirrored = (drain(redraw(picture, source, target)) for picture in (image, image[:, ::-1]))
+    np.testing.assert_allclose(mirrored, plain[:, ::-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("source", ["equirect", "lambert"])
+def test_a_quarter_of_a_turn_turns_the_octahedral_square(source):
+    image = noise(12, 24)
+    plain, turned = (drain(redraw(picture, source, "octahedral")) for picture in (image, np.roll(image, 6, axis=1)))
+    assert min(np.abs(turned - np.rot90(plain, k)).max() for k in (1, 3)) < 1e-9
