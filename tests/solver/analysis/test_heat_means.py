@@ -55,3 +55,14 @@ def test_what_is_even_stays_even_and_the_whole_amount_is_kept_on_the_smallest_me
     np.testing.assert_allclose(HeatMeans(V, F, 0.3).means(3 * area, SIGMAS), 3.0, rtol=1e-8)
     amount = np.where(np.arange(len(V)) == 1, 2.0, 0.0)
     np.testing.assert_allclose(HeatMeans(V, F, 0.3).means(amount, SIGMAS) @ area, 2.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e9])
+def test_vertices_of_no_area_are_left_alone_in_any_unit(size):
+    V, F = meshes.bumpy(6, 6)
+    V = np.vstack([V, [[0.5, 0.5, 3.0]]])
+    amount = np.random.default_rng(0).random(len(V)) * vertex_areas(V, F)
+    plain = HeatMeans(V, F, 0.2).means(amount, SIGMAS)
+    found = HeatMeans(size * V, F, size * 0.2).means(size**2 * amount, size * SIGMAS)
+    np.testing.assert_allclose(found, plain, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(plain[:, :-1], HeatMeans(V[:-1], F, 0.2).means(amount[:-1], SIGMAS), rtol=1e-6)

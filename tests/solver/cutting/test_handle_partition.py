@@ -61,6 +61,20 @@ def test_a_plate_of_many_holes_comes_apart_into_few_handles():
     assert gone.any() and handles(gluing.without(gone)).max() <= MANY_HANDLES
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_bodies_come_apart_as_each_does_alone(first):
+    """A plate of few holes stays whole beside one of many, whichever comes first."""
+    plates = [frame(4), frame(3)]
+    plates = plates[first:] + plates[:first]
+    alone = [partition_pairs(gluing_of(V, F), V, np.zeros(len(F), bool)).sum() for V, F in plates]
+    (V, F), (W, G) = plates
+    both, faces = np.vstack([V, W + 20]), np.vstack([F, G + len(V)])
+    gluing = gluing_of(both, faces)
+    gone = partition_pairs(gluing, both, np.zeros(len(faces), bool))
+    of_first = gluing.first // 3 < len(F)
+    assert [gone[of_first].sum(), gone[~of_first].sum()] == alone and 0 in alone and sum(alone) > 0
+
+
 def test_clusters_have_few_handles_and_nothing_else_is_touched():
     V, F = frame(4)
     W, G = meshes.torus(12, 8)
