@@ -99,9 +99,9 @@ def test_rounds_flip_the_worst_edges_of_their_triangles_and_none_within_one(seed
     flipped = []
 
     def flip(several):
-        wanted = {h for h, x in score.items() if x < 0} - inside
-        rivals = {h: [g for g in wanted if {h // 3, twin[h] // 3} & {g // 3, twin[g] // 3}] for h in wanted}
-        assert set(several.tolist()) == {h for h in wanted if score[h] == min(score[g] for g in rivals[h])}
+        asking = {h for h, x in score.items() if x < 0} - inside
+        rivals = {h: [g for g in asking if {h // 3, twin[h] // 3} & {g // 3, twin[g] // 3}] for h in asking}
+        assert set(several.tolist()) == {h for h in asking if score[h] == min(score[g] for g in rivals[h])}
         flipped.extend(several.tolist())
         score.update(dict.fromkeys(several.tolist(), 1.0))
 
