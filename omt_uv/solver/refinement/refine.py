@@ -246,12 +246,12 @@ def _refined(
     known = None if pins is not None else _symmetry(mesh, asked, faces, by_triangle)
     parts = sweeping_solver(mesh.vertices, mesh.triangles)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
+    if known is not None and symmetry is None and boundary == "free" and not warm:
+        symmetry, w = _embedded_to_image(faces, known, w, by_triangle, mesh, loop)
     if known is not None and symmetry is None:
         free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, *swept)
         symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options, loop), *SMOOTHING)
         warm = warm or symmetry is not None
-        if symmetry is None and boundary == "free" and not warm:
-            symmetry, w = _embedded_to_image(faces, known, w, by_triangle, mesh, loop)
     # It takes the memory of three maps.
     del known
     half = halved(faces, symmetry)
@@ -357,6 +357,17 @@ def _next_to_image(
     return (None, w) if found is None or has_folds(faces, found[1]) else found
 
 
+def _embedded_to_image(
+    faces: Elements, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, mesh: Renumbered, loop
+) -> tuple[MirrorSymmetry | None, np.ndarray]:
+    """The same by way of a mean value map: what came from a coarser mesh need not be symmetric, and its mean with its
+    image may cross itself."""
+    radius = np.sqrt(by_triangle.area.sum() / np.pi)
+    fresh = tutte(mesh.vertices, mesh.triangles, loop, arc_length_boundary(mesh.vertices, loop, radius)) @ [1, 1j]
+    found, mean = _next_to_image(faces, True, symmetry, fresh, by_triangle, "free", loop)
+    return (None, w) if found is None else (found, mean)
+
+
 def _relaxed_to_image(
     problem: MapProblem,
     symmetry: MirrorSymmetry,
@@ -370,17 +381,6 @@ def _relaxed_to_image(
     relaxed = yield from minimise_in_stages(problem, w, options.balance, QUALITIES["relaxed"])
     crossing = problem.loop is not None
     found, mean = _next_to_image(problem.faces, crossing, symmetry, relaxed.w, by_triangle, options.boundary, loop)
-    return (None, w) if found is None else (found, mean)
-
-
-def _embedded_to_image(
-    faces: Elements, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, mesh: Renumbered, loop
-) -> tuple[MirrorSymmetry | None, np.ndarray]:
-    """The same by way of a mean value map: what came from a coarser mesh need not be symmetric, and its mean with its
-    image may cross itself."""
-    radius = np.sqrt(by_triangle.area.sum() / np.pi)
-    fresh = tutte(mesh.vertices, mesh.triangles, loop, arc_length_boundary(mesh.vertices, loop, radius)) @ [1, 1j]
-    found, mean = _next_to_image(faces, True, symmetry, fresh, by_triangle, "free", loop)
     return (None, w) if found is None else (found, mean)
 
 
