@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts
 from ..maps.development import unrolled
 from ..mesh.charts import Chart, part_of_chart, sound_disks
@@ -120,22 +121,58 @@ def in_pieces(
 ) -> Steps[tuple[DiskCharts, list[ChartMap]]]:
     """Charts and maps, those cut in pieces that leave most of a texture empty: long bands, as those of a gear or a
     cable, and bodies with limbs. Charts that were not cut at all, and those with marked seams, stay whole."""
-    surface = search.surface
-    chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
-    whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum()) + search.shear.beside
+    whole = _whole_area(search)
     cuts = prepared.found_cuts
     new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts.edges]
     for chart, chart_map in zip(prepared.charts, maps, strict=True):
         found, between = ([chart], [chart_map]), cuts.edges[:0]
-        # Most are compact, and of thousands nothing else is asked.
-        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0:
-            was_cut = np.isin(outline(chart), pair_keys(*cuts.edges.T)).any()
-            if was_cut and not is_marked(surface, chart):
-                found, between = yield from _pieces(search, chart, chart_map, whole, map_charts)
+        if _is_searched(search, chart, chart_map, cuts, whole):
+            found, between = yield from _pieces(search, chart, chart_map, whole, map_charts)
         new_charts += found[0]
         new_maps += found[1]
         edges.append(between)
     return replace(prepared, charts=new_charts, cuts=joined(search, cuts, np.concatenate(edges))), new_maps
+
+
+def may_come_in_pieces(search: ShearSearch, last: Round) -> bool:
+    """Whether `in_pieces` looks for pieces of any chart of a round."""
+    from ..seams.limbs import may_come_apart
+
+    whole, up = _whole_area(search), _up(search)
+    return any(
+        _is_searched(search, chart, chart_map, last.cuts, whole) and may_come_apart(chart, chart_map.uv, up, whole)
+        for chart, chart_map in zip(last.charts, last.maps, strict=True)
+    )
+
+
+def _is_searched(search: ShearSearch, chart: Chart, chart_map: ChartMap, cuts: Cuts, whole: float) -> bool:
+    """Whether a chart of surfaces of area `whole` is large in its map, and cut by no hand."""
+    # Most are compact, and of thousands nothing else is asked.
+    if not np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0:
+        return False
+    was_cut = np.isin(outline(chart), pair_keys(*cuts.edges.T)).any()
+    return bool(was_cut) and not is_marked(search.surface, chart)
+
+
+def _whole_area(search: ShearSearch) -> float:
+    """The area of all that goes into a texture with what is searched."""
+    surface = search.surface
+    chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
+    return float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum()) + search.shear.beside
+
+
+def _up(search: ShearSearch) -> tuple[float, float, float] | None:
+    """Which way a surface stands, if that is known."""
+    axes = search.shear.preferences.axes
+    return None if axes is None else axes.up
+
+
+def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
+    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
+    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
+    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
+    most = float(pressing.max(initial=0.0)) / search.shear.bound
+    return most <= 1 or most > 1 + NEARLY
 
 
 def _pieces(
@@ -145,8 +182,7 @@ def _pieces(
     neither long nor sprawls, or the pieces are no disks."""
     from ..seams.limbs import may_come_apart, pieces_of_chart
 
-    axes = search.shear.preferences.axes
-    up = None if axes is None else axes.up
+    up = _up(search)
     if not may_come_apart(chart, chart_map.uv, up, whole):
         return ([chart], [chart_map]), np.zeros((0, 2), np.int64)
     cost = search.costs().vertex_cost[chart.vertex_ids]

@@ -17,7 +17,7 @@ from ..seams.options import COMPACT, SPREAD_BY_SHEAR
 from .chart_indices import but_within, edge_set, is_marked
 from .chart_map import ChartMap
 from .mirrored_charts import mapped_anew
-from .pieces import come_apart
+from .pieces import come_apart, may_come_in_pieces
 from .shear_search import (
     MARGIN,
     NEARLY,
@@ -105,12 +105,14 @@ class BoundedShear:
     maps : of the charts
     warnings : which of them miss it, and what helps
     ended_early : somebody has asked for the end
+    is_short : no shorter cuts are left to be looked for
     """
 
     prepared: DiskCharts
     maps: list[ChartMap]
     warnings: tuple[str, ...]
     ended_early: bool = False
+    is_short: bool = True
 
 
 def bound_shear(
@@ -121,28 +123,32 @@ def bound_shear(
     crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None = None,
     map_sparing: Callable[[list[Chart]], Steps[list[ChartMap]]] | None = None,
     of_pieces: bool = False,
+    may_part: bool = False,
 ) -> Steps[BoundedShear]:
     """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or the worst stays.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
     crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
     map_sparing : a solver that shears less, for areas no more exact than is promised; of_pieces : charts are pieces of
-    a whole that was searched. Progress offers an early end: with the maps of the last round. Errors: see `map_charts`.
+    a whole that was searched; may_part : charts are asked for pieces after this, and those that may come in some, which
+    have seams of their own, are not cut shorter before. Progress offers an early end: with the maps of the last round.
+    Errors: see `map_charts`.
     """
     early, free = EarlyEnd(), crossing is not None
     begun = yield from part_of(_first_round(search, first, maps, map_charts, free, early), 0.0, 0.0)
     begun = begun.settled_where_searched(search, all_of_them=of_pieces)
-    rounds = _further_rounds(search, begun, map_charts, crossing, map_sparing, early)
-    found = yield from part_of(rounds, 0.0, 1 - JOINING)
+    rounds = _further_rounds(search, begun, map_charts, crossing, map_sparing, early, may_part)
+    found, is_short = yield from part_of(rounds, 0.0, 1 - JOINING)
     if not early.is_asked:
         found = yield from part_of(_joined_again(search, begun, found, map_charts, early), 1 - JOINING, JOINING)
-    return _result(found, search, first.warnings, early)
+    return _result(found, search, first.warnings, early, is_short)
 
 
 def _further_rounds(
-    search: ShearSearch, begun: Round, map_charts, crossing, map_sparing, early: EarlyEnd
-) -> Steps[Round]:
-    """The best of the rounds after a first one, see `bound_shear`; made shorter where it keeps the bound."""
+    search: ShearSearch, begun: Round, map_charts, crossing, map_sparing, early: EarlyEnd, may_part: bool
+) -> Steps[tuple[Round, bool]]:
+    """The best of the rounds after a first one, see `bound_shear`, made shorter where it keeps the bound, and whether
+    it is: not before it comes in pieces."""
     best = last = begun = yield from part_of(_in_halves(search, begun, map_charts, early, stuck=True), 0.0, 0.0)
     spread, promised, crossed = search.first_spread(), np.full(search.count, np.inf), False
     tried, worse, rehearsed = {edge_set(last.cuts.edges)}, set[tuple[bytes, bytes]](), dict[str, Any]()
@@ -160,7 +166,7 @@ def _further_rounds(
             # by little not be searched.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
-                return spared
+                return spared, True
         is_stuck, best = rounds > TRIED and last is not best and last.is_hardly_better(best), last
         parting = part_of(come_apart(search, last, crossing, rounds, worse), begin, width * PARTING)
         parts = yield from unless_ended(parting, early)
@@ -183,9 +189,11 @@ def _further_rounds(
     else:
         begin = 1 - 0.5 ** (MOST_ROUNDS - 1)
     best = last if last.excess <= best.excess else best
-    if not early.is_asked:
-        best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
-    return best
+    if early.is_asked:
+        return best, True
+    if may_part and not best.excess and may_come_in_pieces(search, best):
+        return best, False
+    return (yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)), True
 
 
 def _joined_again(search: ShearSearch, begun: Round, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
@@ -403,11 +411,14 @@ def _as_flat(last: Round, new: Round, of: np.ndarray) -> np.ndarray:
     return (sheared <= AS_SHEARED * last.area * np.log(last.mean)) | (last.mean > NEARLY_FLAT)
 
 
-def _result(last: Round, search: ShearSearch, warnings: tuple[str, ...], early: EarlyEnd) -> BoundedShear:
+def _result(
+    last: Round, search: ShearSearch, warnings: tuple[str, ...], early: EarlyEnd, is_short: bool
+) -> BoundedShear:
     """The charts and maps of a round, with warnings of how they were made and of those that miss the bound."""
     by_hand, why = ~np.isin(np.arange(len(last.charts)), last.searched), ENDED_EARLY if early.is_asked else MORE_SEAMS
     mean = last.mean ** np.where(last.mean > last.bound, search.lenience_of(last.charts), 1.0)
     missed = tuple(search.shear.missed(mean, last.area, by_hand, why))
     # Another call for the same search need not do in vain what this one did.
     search.memory.update(last.memory)
-    return BoundedShear(DiskCharts(last.charts, last.cuts, warnings), last.maps, missed, early.is_asked)
+    prepared = DiskCharts(last.charts, last.cuts, warnings)
+    return BoundedShear(prepared, last.maps, missed, early.is_asked, is_short)

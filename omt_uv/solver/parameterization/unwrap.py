@@ -51,9 +51,9 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .pieces import in_pieces
+from .pieces import in_pieces, is_worth_bounding
 from .shear_bound import bound_shear
-from .shear_search import NEARLY, Round, ShearSearch
+from .shear_search import ShearSearch
 from .small_charts import is_small, map_together
 
 # Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps; at last those of pieces.
@@ -158,17 +158,19 @@ def unwrap(
     crossing = remembered(task.crossing) if pins is None and task.options.boundary == "free" else None
     said, settled = prepared.warnings, search is None
     missed: tuple[str, ...] = ()
+    may_part, short = crossing is not None and target is None, True
     if search is not None:
-        further = bound_shear(search, prepared, maps, task.map_charts, crossing, task.sparing)
+        further = bound_shear(search, prepared, maps, task.map_charts, crossing, task.sparing, may_part=may_part)
         found = yield from part_of(further, begin + width, 1 - begin - width - PIECES)
         said, missed, settled = (*said, *cut_for_a_map(maps, found.maps)), found.warnings, found.ended_early
-        prepared, maps = found.prepared, found.maps
-    if cut.search is not None and crossing is not None and target is None:
+        prepared, maps, short = found.prepared, found.maps, found.is_short
+    if cut.search is not None and may_part:
         pieces = in_pieces(cut.search, prepared, maps, task.map_charts)
         apart, parts = yield from part_of(pieces, 1 - PIECES, PIECES / 2)
-        if len(parts) > len(maps) and not settled and is_worth_bounding(cut.search, apart, parts):
-            # Limbs can shear more than the mean of them and all else.
-            further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing, of_pieces=True)
+        several = len(parts) > len(maps)
+        # Limbs can shear more than the mean of them and all else.
+        if not settled and (is_worth_bounding(cut.search, apart, parts) if several else not short):
+            further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing, of_pieces=several)
             found = yield from part_of(further, 1 - PIECES / 2, PIECES / 2)
             apart, parts, missed = found.prepared, found.maps, found.warnings
         prepared, maps = apart, parts
@@ -177,14 +179,6 @@ def unwrap(
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)
     return SurfaceMap(charts, maps, cuts, (*said, *missed), None if cut.search is None else cut.search.axes)
-
-
-def is_worth_bounding(search: ShearSearch, prepared: DiskCharts, maps: list[ChartMap]) -> bool:
-    """Whether maps of pieces are to be bounded again: where any misses the bound by more than a little, or none does,
-    and shorter cuts may do. For a head that misses it by a hundredth horns would come off."""
-    pressing = Round.of(search, prepared.charts, maps, prepared.found_cuts, search.memory).pressing
-    most = float(pressing.max(initial=0.0)) / search.shear.bound
-    return most <= 1 or most > 1 + NEARLY
 
 
 def cut_for_a_map(first: list[ChartMap], maps: list[ChartMap]) -> list[str]:

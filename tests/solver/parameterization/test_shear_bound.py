@@ -441,9 +441,9 @@ def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, thinned
 def test_pieces_are_bounded_again_where_none_misses_the_bound_or_one_does_by_much(monkeypatch, shears, worth):
     """What misses it by a hundredth stays: the mean of all has kept it."""
     round_of = SimpleNamespace(of=lambda *_: SimpleNamespace(pressing=np.array(shears, float)))
-    monkeypatch.setattr(unwrap_module, "Round", round_of)
+    monkeypatch.setattr(pieces, "Round", round_of)
     search = SimpleNamespace(shear=ShearBound(1.3), memory={})
-    assert unwrap_module.is_worth_bounding(search, SimpleNamespace(charts=[], found_cuts=None), []) == worth
+    assert pieces.is_worth_bounding(search, SimpleNamespace(charts=[], found_cuts=None), []) == worth
 
 
 def test_what_misses_the_bound_by_little_keeps_it_with_areas_as_exact_as_is_promised(monkeypatch):

@@ -69,7 +69,7 @@ class Made:
 def bounded(monkeypatch):
     """The result of rounds that are written, and what each was asked for."""
 
-    def run(*rounds, apart=(), crossed=(), spared=None, crossing="crossing", stop=None, ask_end=None, **given):
+    def run(*rounds, apart=(), crossed=(), spared=None, crossing="crossing", ask_end=None, pieces=False, may_part=True):
         asked, rest, parts, crossings = [], list(rounds[1:]), list(apart), list(crossed)
         joined, halved = [], []
 
@@ -127,10 +127,16 @@ def bounded(monkeypatch):
         monkeypatch.setattr(shear_bound, "_joined_again", again)
         monkeypatch.setattr(shear_bound, "_in_halves", halves)
         monkeypatch.setattr(shear_bound, "JOINING", 0.0)
-        monkeypatch.setattr(shear_bound, "_result", lambda best, search, warnings, early: (best.name, early.is_asked))
+
+        def result(best, search, warnings, early, is_short):
+            asked.extend([] if is_short else [("long", best.name)])
+            return best.name, early.is_asked
+
+        monkeypatch.setattr(shear_bound, "_result", result)
         search = SimpleNamespace(first_spread=lambda: np.array([8.0]), count=1)
         prepared = SimpleNamespace(warnings=())
-        fractions, steps = [], bound_shear(search, prepared, [], None, crossing)
+        monkeypatch.setattr(shear_bound, "may_come_in_pieces", lambda *_: pieces)
+        fractions, steps = [], bound_shear(search, prepared, [], None, crossing, may_part=may_part)
         try:
             while True:
                 fractions.append(next(steps).fraction)
@@ -155,6 +161,19 @@ def test_what_keeps_the_bound_is_only_made_shorter(bounded):
     assert found == ("first", False) and asked == [("first", True), ("shorter", "first")]
     assert bounded(Made("first"), crossing=None)[1][0] == ("first", False)
     assert fractions == pytest.approx([0, 0, 0, 0, 0, 1])
+
+
+def test_what_may_come_in_pieces_is_not_made_shorter_before(bounded):
+    assert bounded(Made("first"), pieces=True)[1] == [("first", True), ("long", "first")]
+    # Not where nobody asks for pieces, or it is cut as long as it may be.
+    for given, rounds in (({"may_part": False}, [Made("first")]), ({}, [Made("first", 2.0), None])):
+        asked = bounded(*rounds, pieces=True, **given)[1]
+        assert names(asked, "shorter") == ["first"] and not names(asked, "long")
+    # What was spared is short, and what was broken off stays as it is.
+    kept = bounded(Made("first", 2.0, mean_missed=False), spared=Made("spared"), pieces=True)
+    assert kept[0][0] == "spared" and not names(kept[1], "long")
+    found, asked, _ = bounded(Made("first", 3.0), Made("second", 0.0), ask_end=1, pieces=True)
+    assert found == ("second", True) and not names(asked, "long")
 
 
 def test_rounds_go_on_until_the_bound_is_kept(bounded):

@@ -71,6 +71,7 @@ def whole(monkeypatch):
         settled=False,
         worth=True,
         given=False,
+        short=True,
         **options,
     ):
         taken, maps = [], [mapped()]
@@ -92,14 +93,17 @@ def whole(monkeypatch):
                 prepared=made.prepared,
                 maps=maps * (parts if again else 1),
                 ended_early=settled,
+                is_short=short or again,
                 warnings=("again" if again else "missed",),
             )
 
         bounds = iter(["first", "apart"])
 
-        def bounding(*_, of_pieces=False):
+        def bounding(*_, of_pieces=False, may_part=False):
             first = next(bounds)
-            assert of_pieces == (first == "apart")
+            assert of_pieces == (first == "apart" and parts > 1)
+            # Pieces are asked for once.
+            assert may_part == (first == "first" and pins is None and target is None and options.boundary == "free")
             return step("bound", lambda *_: bound(first))()
 
         monkeypatch.setattr(unwrapping, "cut_charts", step("cut", made))
@@ -134,6 +138,10 @@ PINS = CornerPins(np.zeros(24, bool), np.zeros((24, 2)))
         ({"target": "target"}, ["cut", "map", "bound", "finish"]),
         ({"parts": 2}, ["cut", "map", "bound", "pieces", "bound", "finish"]),
         ({"parts": 2, "worth": False}, ["cut", "map", "bound", "pieces", "finish"]),
+        ({"short": False}, ["cut", "map", "bound", "pieces", "bound", "finish"]),
+        ({"short": False, "parts": 2}, ["cut", "map", "bound", "pieces", "bound", "finish"]),
+        ({"short": False, "parts": 2, "worth": False}, ["cut", "map", "bound", "pieces", "finish"]),
+        ({"short": False, "settled": True}, ["cut", "map", "bound", "pieces", "finish"]),
         ({"parts": 2, "settled": True}, ["cut", "map", "bound", "pieces", "finish"]),
         ({"search": False, "boundary": "disk"}, ["cut", "map", "finish", "room"]),
         ({"search": False, "boundary": "disk", "kind": "conformal"}, ["cut", "map", "finish"]),
