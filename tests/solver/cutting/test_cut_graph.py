@@ -1,5 +1,7 @@
 """Cuts along edges: what they leave, and that none can be shortened."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -133,3 +135,17 @@ def test_bridges_are_the_shortest_paths_of_the_cut_mesh(mesh, seed):
             assert component.cost[path].sum() == pytest.approx(expected) and len(np.unique(path)) == len(path)
             assert cut_graph._shortest_bridge(component, rest, tips, 0.9 * expected) is None
     assert checked
+
+
+def test_there_is_no_bridge_across_what_is_barred_all_around():
+    """However much it may cost; a cut stays where nothing shorter replaces it."""
+    component = component_of(*meshes.annulus(rings=4))
+    radius = np.linalg.norm(component.positions, axis=1)
+    middle = np.abs(radius - np.median(np.unique(radius.round(9)))) < 1e-6
+    barred = middle[component.ends].any(axis=1)
+    assert middle.any() and not middle[component.on_boundary()].any()
+    cut = greedy_arcs(component, np.zeros(0, int))
+    component = replace(component, cost=np.where(barred, np.inf, component.cost))
+    none = np.zeros(0, np.int64)
+    assert cut_graph._shortest_bridge(component, np.zeros_like(cut), none, np.inf) is None
+    assert np.array_equal(shorten(component, cut.copy(), none), cut)

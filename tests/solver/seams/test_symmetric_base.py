@@ -1,5 +1,6 @@
 """Symmetric bodies become disks symmetrically, handles or not, and scans that nearly are get seams that nearly are."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -7,8 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from omt_uv.solver.analysis.seam_costs import seam_costs
+from omt_uv.solver.analysis.facing import Y_UP
+from omt_uv.solver.analysis.seam_costs import SeamPreferences, seam_costs
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import search
 from omt_uv.solver.seams.search import SeamSearch
 from omt_uv.solver.seams.symmetric_base import _paths, symmetric_base
@@ -79,6 +85,20 @@ def test_handles_are_opened_symmetrically(mirrored_in, image, spread, monkeypatc
     far, image = cKDTree(V).query(V * image)
     assert far.max() < 1e-9 and joined[0].any()
     assert set(map(tuple, edges.tolist())) == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+
+
+@pytest.mark.parametrize("turn", range(3))
+def test_a_ring_comes_apart_whichever_way_it_stands(turn):
+    """Each half is an annulus, of which no cut but along the plane, which is barred, makes a disk."""
+    V, _ = meshes.torus(24, 12, 0.25)
+    ids = np.arange(24 * 12).reshape(24, 12)
+    right, up = np.roll(ids, -1, axis=0), np.roll(ids, -1, axis=1)
+    quads = np.stack([ids, right, np.roll(right, -1, axis=1), up], axis=2).reshape(-1, 4)
+    surface = meshes.polygon_surface(np.roll(V, turn, axis=1), quads)
+    options = UnwrapOptions(max_shear=1.35, preferences=SeamPreferences(axes=Y_UP))
+    found = drain(unwrap(surface, options=options))
+    assert max(one.angle_mean for one in found.maps) < 1.35
+    assert sum(one.folds for one in found.maps) == 0 and strict_charts(replace(surface, seams=found.seams))
 
 
 @pytest.mark.parametrize(("mirrored_in", "image"), [("across", [1, 1, -1]), ("along", [-1, 1, 1])])
