@@ -15,7 +15,7 @@ from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart, triangle_rows
 from ..mesh.geometry import of_corners
 from ..mesh.surface import Surface, is_seam
-from ..mesh.topology import boundary_edges, distinct, pair_keys
+from ..mesh.topology import boundary_edges, distinct, graph_components, pair_keys
 from ..refinement.pins import Pins, aligned_to_pins, check_pins
 
 # Triangles beyond which the numbers of a chart take half of the memory.
@@ -159,6 +159,30 @@ def identity(chart: Chart) -> tuple[bytes, bytes]:
     corners, triangles = in_order_of_corners(chart)
     _, first, number = np.unique(triangles, return_index=True, return_inverse=True)
     return corners.tobytes(), first[number.ravel()].tobytes()
+
+
+def chart_of_polygons(charts: list[Chart], count: int) -> np.ndarray:
+    """The chart (f,) that each of so many polygons of the surface is in, -1 for none."""
+    found = np.full(count, -1)
+    for k, chart in enumerate(charts):
+        found[chart.faces] = k
+    return found
+
+
+def with_entangled(charts: list[Chart], chosen: np.ndarray, others: list[Chart], count: int) -> np.ndarray:
+    """Charts (k,) bool that are chosen, or hang together with one that is by other charts of the same polygons, of
+    which there are so many, that have some of both, as where faces lie on each other."""
+    faces = np.concatenate([chart.faces for chart in others])
+    other = np.repeat(np.arange(len(others)), [len(chart.faces) for chart in others])
+    label = graph_components(chart_of_polygons(charts, count)[faces], len(charts) + other, len(charts) + len(others))[1]
+    return np.isin(label[: len(charts)], label[: len(charts)][chosen])
+
+
+def refuse_lost_faces(before: list[Chart], after: list[Chart]) -> None:
+    """Raise a MeshError where a polygon is in a chart before, and in none after."""
+    lost = np.setdiff1d(*(np.concatenate([chart.faces for chart in charts]) for charts in (before, after)))
+    if len(lost):
+        raise MeshError("Faces were lost when charts were cut further", "Unwrap without a maximal shear", "face", lost)
 
 
 def in_order_of_corners(chart: Chart) -> tuple[np.ndarray, np.ndarray]:

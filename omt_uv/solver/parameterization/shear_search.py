@@ -24,7 +24,7 @@ from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_edges, boundary_loops, pair_keys
 from ..progress import Steps, part_of
-from .chart_indices import all_within, identity, is_marked, mirror_twins, outline
+from .chart_indices import all_within, chart_of_polygons, identity, is_marked, mirror_twins, outline, with_entangled
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
@@ -316,26 +316,21 @@ class Round:
         merged = self.merged(search, new, of, stay)
         return merged, worse | {identity(chart) for chart in itertools.compress(self.charts, stay)}
 
-    def _region(self, search: ShearSearch) -> np.ndarray:
-        """The chart (f,) that polygons of the surface are in, -1 for none."""
-        region = np.full(search.count, -1)
-        for k, chart in enumerate(self.charts):
-            region[chart.faces] = k
-        return region
-
     def chart_of(self, search: ShearSearch, new: Round) -> np.ndarray:
         """The chart (k,) of this round that those of a new one are parts of."""
-        region = self._region(search)
+        region = chart_of_polygons(self.charts, search.count)
         return np.array([region[chart.faces[0]] for chart in new.charts])
 
     def merged(self, search: ShearSearch, new: Round, of: np.ndarray, stay: np.ndarray) -> Round:
-        """A new round, but for the charts of this one that stay (k,) bool as they are; of: see `chart_of`."""
+        """A new round, but for the charts of this one that stay (k,) bool as they are, and those entangled with them;
+        of: see `chart_of`."""
+        stay = with_entangled(self.charts, stay, new.charts, search.count)
         charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
         maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
         edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
         edges = edges[np.isin(pair_keys(*edges.T), np.concatenate([outline(chart) for chart in charts]))]
         # What was found for parts that are as they were is forgotten.
-        region = self._region(search)
+        region = chart_of_polygons(self.charts, search.count)
         memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
         memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
         cuts = joined(search, self.cuts, edges)

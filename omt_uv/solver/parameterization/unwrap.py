@@ -33,6 +33,7 @@ from .chart_indices import (
     in_order_of_places,
     located,
     pins_of_chart,
+    refuse_lost_faces,
 )
 from .chart_map import WITHOUT_MAP, ChartMap, no_map, refined_again
 from .convex_maps import with_convex_polygons, with_drawn_triangles, with_folds_counted
@@ -174,6 +175,7 @@ def unwrap(
             found = yield from part_of(further, 1 - PIECES / 2, PIECES / 2)
             apart, parts, missed = found.prepared, found.maps, found.warnings
         prepared, maps = apart, parts
+    refuse_lost_faces(cut.prepared.charts, prepared.charts)
     charts, cuts = prepared.charts, np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     given, (charts, maps) = charts, (yield from task.finished(charts, maps, surface))
     if task.options.boundary != "free" and task.options.kind == "authalic":

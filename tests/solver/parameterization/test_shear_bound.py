@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from scripted_steps import worked
 
+from omt_uv.solver.analysis.facing import Y_UP
+from omt_uv.solver.analysis.seam_costs import SeamPreferences
 from omt_uv.solver.cutting.cuts import Cuts
-from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, FoldedUVError
+from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, FoldedUVError, MeshError
 from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths, face_areas, signed_areas
@@ -18,7 +20,13 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, pair_keys
 from omt_uv.solver.parameterization import pieces, shear_bound, shear_search
 from omt_uv.solver.parameterization import unwrap as unwrap_module
-from omt_uv.solver.parameterization.chart_indices import identity, within
+from omt_uv.solver.parameterization.chart_indices import (
+    chart_of_polygons,
+    identity,
+    refuse_lost_faces,
+    with_entangled,
+    within,
+)
 from omt_uv.solver.parameterization.chart_map import local_shear, map_chart
 from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -493,3 +501,37 @@ def test_a_small_sphere_is_cut_no_more_than_it_needs():
     found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
     assert len(found.charts) == 1 and 1.2 < found.maps[0].angle_mean < 1.35
     assert edge_lengths(V, found.seams).sum() < 2.3 * np.sqrt(4 * np.pi)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("turn", range(3))
+def test_no_face_is_lost_where_faces_lie_on_each_other(turn, turned):
+    """What one of two is cut along the other is cut along as well: new charts have parts of both."""
+    V, F = meshes.bumpy()
+    twice = F[V[F][:, :, 1].mean(axis=1) > np.median(V[:, 1])]
+    surface = triangle_surface(np.roll(V, turn, axis=1), np.concatenate([F, twice[:, ::-1] if turned else twice]))
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35, preferences=SeamPreferences(axes=Y_UP))))
+    assert np.array_equal(
+        np.unique(np.concatenate([chart.faces for chart in found.charts])), range(len(F) + len(twice))
+    )
+
+
+def test_charts_are_entangled_by_others_with_parts_of_both():
+    def charts(*faces):
+        return [SimpleNamespace(faces=np.array(one)) for one in faces]
+
+    before = charts([0, 1], [2, 3], [4, 5], [6])
+    for others, chosen, staying in (
+        (charts([0], [1], [2, 3], [4, 5], [6]), [0], [0]),
+        (charts([0], [1, 2], [3], [4, 5], [6]), [0], [0, 1]),
+        (charts([0, 2], [1], [3, 5], [4], [6]), [2], [0, 1, 2]),
+        (charts([0, 2], [1], [3, 5], [4], [6]), [3], [3]),
+        (charts([0, 2], [1], [3, 5], [4], [6]), [], []),
+    ):
+        found = with_entangled(before, np.isin(np.arange(4), chosen), others, 7)
+        assert np.flatnonzero(found).tolist() == staying
+    assert chart_of_polygons(before, 8).tolist() == [0, 0, 1, 1, 2, 2, 3, -1]
+    refuse_lost_faces(before, charts([6, 5, 4], [3, 2], [1, 0]))
+    with pytest.raises(MeshError) as refused:
+        refuse_lost_faces(before, charts([5, 4], [3, 2], [1]))
+    assert refused.value.kind == "face" and refused.value.elements.tolist() == [0, 6]
