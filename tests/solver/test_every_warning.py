@@ -718,13 +718,13 @@ def not_searched(patch):
     begin = "An island shears 2 in the mean, above 1.5: "
     found = "no seams were found that would pay; allow for more shear, or mark some yourself"
     ended = SimpleNamespace(is_asked=True)
-    yield shear_bound._result(last, search, (), EarlyEnd()).warnings, [begin + found]
+    yield shear_bound._result(last, search, (), EarlyEnd(), True).warnings, [begin + found]
     yield (
-        shear_bound._result(last, search, (), ended).warnings,
+        shear_bound._result(last, search, (), ended, True).warnings,
         [f"{begin}kept before its seams were done; unwrap again"],
     )
     last.mean[0] = 1.5
-    yield shear_bound._result(last, search, (), ended).warnings, []
+    yield shear_bound._result(last, search, (), ended, True).warnings, []
 
 
 @says("solver/errors.py", "merge vertices that coincide")

@@ -53,7 +53,7 @@ from .mirrored_charts import (
 )
 from .options import ShearBound, UnwrapOptions
 from .pieces import in_pieces, is_worth_bounding
-from .shear_bound import bound_shear
+from .shear_bound import BoundedShear, bound_shear
 from .shear_search import ShearSearch
 from .small_charts import is_small, map_together
 
@@ -157,30 +157,33 @@ def unwrap(
     prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
     crossing = remembered(task.crossing) if pins is None and task.options.boundary == "free" else None
-    said, settled = prepared.warnings, search is None
-    missed: tuple[str, ...] = ()
-    may_part, short = crossing is not None and target is None, True
+    said, may_part = prepared.warnings, crossing is not None and target is None
+    found = BoundedShear(prepared, maps, (), ended_early=search is None)
     if search is not None:
         further = bound_shear(search, prepared, maps, task.map_charts, crossing, task.sparing, may_part=may_part)
         found = yield from part_of(further, begin + width, 1 - begin - width - PIECES)
-        said, missed, settled = (*said, *cut_for_a_map(maps, found.maps)), found.warnings, found.ended_early
-        prepared, maps, short = found.prepared, found.maps, found.is_short
+        said = (*said, *cut_for_a_map(maps, found.maps))
     if cut.search is not None and may_part:
-        pieces = in_pieces(cut.search, prepared, maps, task.map_charts)
-        apart, parts = yield from part_of(pieces, 1 - PIECES, PIECES / 2)
-        several = len(parts) > len(maps)
-        # Limbs can shear more than the mean of them and all else.
-        if not settled and (is_worth_bounding(cut.search, apart, parts) if several else not short):
-            further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing, of_pieces=several)
-            found = yield from part_of(further, 1 - PIECES / 2, PIECES / 2)
-            apart, parts, missed = found.prepared, found.maps, found.warnings
-        prepared, maps = apart, parts
+        found = yield from part_of(_come_in_pieces(task, cut.search, found, crossing), 1 - PIECES, PIECES)
+    prepared, maps, missed = found.prepared, found.maps, found.warnings
     refuse_lost_faces(cut.prepared.charts, prepared.charts)
     charts, cuts = prepared.charts, np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     given, (charts, maps) = charts, (yield from task.finished(charts, maps, surface))
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)
     return SurfaceMap(charts, maps, cuts, (*said, *missed), None if cut.search is None else cut.search.axes)
+
+
+def _come_in_pieces(task: _Task, search: ShearSearch, last: BoundedShear, crossing) -> Steps[BoundedShear]:
+    """Charts and those of their pieces that fill more of a texture, bounded again unless the end was asked for."""
+    pieces = in_pieces(search, last.prepared, last.maps, task.map_charts)
+    apart, parts = yield from part_of(pieces, 0.0, 0.5)
+    several = len(parts) > len(last.maps)
+    if last.ended_early or not (is_worth_bounding(search, apart, parts) if several else not last.is_short):
+        return replace(last, prepared=apart, maps=parts)
+    # Limbs can shear more than the mean of them and all else.
+    further = bound_shear(search, apart, parts, task.map_charts, crossing, task.sparing, of_pieces=several)
+    return (yield from part_of(further, 0.5, 0.5))
 
 
 def cut_for_a_map(first: list[ChartMap], maps: list[ChartMap]) -> list[str]:

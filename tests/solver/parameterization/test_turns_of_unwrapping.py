@@ -21,6 +21,7 @@ from omt_uv.solver.parameterization import unwrap as unwrapping
 from omt_uv.solver.parameterization.chart_indices import ChartPins, CornerPins
 from omt_uv.solver.parameterization.chart_map import ChartMap, no_map
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
+from omt_uv.solver.parameterization.shear_bound import BoundedShear
 from omt_uv.solver.parameterization.unwrap import CutCharts, SurfaceMap, map_small_charts
 from omt_uv.solver.progress import Progress, RunLog, drain
 
@@ -89,7 +90,7 @@ def whole(monkeypatch):
 
         def bound(first, *words):
             again = first == "apart"
-            return SimpleNamespace(
+            return BoundedShear(
                 prepared=made.prepared,
                 maps=maps * (parts if again else 1),
                 ended_early=settled,
