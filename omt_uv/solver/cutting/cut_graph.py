@@ -290,7 +290,7 @@ def _between(
     total = distance[ended[1]] + component.cost[ended[0]]
     last = int(total.argmin())
     # What is barred all around has no way, whatever it may cost.
-    if not total[last] <= min(longest, np.finfo(float).max):
+    if not (np.isfinite(total[last]) and total[last] <= longest):
         return None
     on_path = _ancestors(np.where(before[:n] < n, before[:n], -1), ended[1][[last]])
     first = on_path[before[on_path] == n]
