@@ -103,6 +103,10 @@ def outcome(judge, seed, case=wide_case):
     uv = np.zeros((len(surface.corner_vertex), 2), np.float32)
     uv[layout.corners[0]] = layout.uv[0]
     assert np.isfinite(uv).all()
+    mapped = np.isin(np.arange(len(uv)), layout.corners[0])
+    face = np.repeat(np.arange(len(chosen)), np.diff(surface.face_start))
+    lost = chosen & (np.bincount(face, ~mapped, len(chosen)) > 0)
+    assert not lost.any(), f"faces {np.flatnonzero(lost)[:10]} have no UVs, {layout.warnings}"
     # Blender holds no such numbers that their squares are none.
     used = surface.positions[np.isfinite(surface.positions).all(axis=1)]
     surface = replace(surface, positions=surface.positions / (np.abs(used).max() or 1.0))
