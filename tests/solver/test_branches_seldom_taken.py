@@ -361,7 +361,7 @@ def test_newton_steps_on_a_surface_end_where_little_is_gained(lower, predicted, 
         return None if low is None else (placed + 1, low, promise)
 
     monkeypatch.setattr(surface_newton, "_step", step)
-    problem = SimpleNamespace(energy=lambda placed: 100.0)
+    problem = SimpleNamespace(energy=lambda placed: 100.0, left_out=None)
     (placed, count), fractions = told(surface_newton.minimise_on(problem, 0, 3, 0.01, "A"))
     assert placed == count == steps and fractions == pytest.approx(np.arange(len(fractions)) / 3)
     assert len(fractions) == steps + (None in lower)

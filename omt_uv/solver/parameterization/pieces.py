@@ -34,6 +34,9 @@ MORE_SLIT = 0.001
 SHEARED = 2.0
 # What is steep alone is slit so many times before it may come apart.
 SLIT_AT_FIRST = 2
+# Charts with more vertices are not cut shorter before they come in pieces, which takes as long as all else; of others
+# seams become shorter by it, since what was cut of a whole is not taken back in its pieces.
+LARGE = 10_000
 
 
 def come_apart(
@@ -135,12 +138,14 @@ def in_pieces(
 
 
 def may_come_in_pieces(search: ShearSearch, last: Round) -> bool:
-    """Whether `in_pieces` looks for pieces of any chart of a round."""
+    """Whether `in_pieces` looks for pieces of any large chart of a round."""
     from ..seams.limbs import may_come_apart
 
     whole, up = _whole_area(search), _up(search)
     return any(
-        _is_searched(search, chart, chart_map, last.cuts, whole) and may_come_apart(chart, chart_map.uv, up, whole)
+        len(chart.vertices) > LARGE
+        and _is_searched(search, chart, chart_map, last.cuts, whole)
+        and may_come_apart(chart, chart_map.uv, up, whole)
         for chart, chart_map in zip(last.charts, last.maps, strict=True)
     )
 

@@ -14,6 +14,7 @@ from omt_uv.solver.mesh.charts import part_of_chart, strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization import pieces
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -251,24 +252,43 @@ def test_pieces_are_mapped_as_if_their_seams_were_given(monkeypatch, seed):
     np.testing.assert_allclose(*shears, rtol=1e-3)
 
 
+@pytest.mark.parametrize("large", [False, True])
 @pytest.mark.parametrize("seed", [3, 8])
-def test_limbs_that_come_off_keep_the_bound_by_themselves(seed, monkeypatch):
-    """Not only in the mean with what they hung on; what is said is about the pieces."""
-    for name in ("SPRAWLING", "FULL", "FULLER", "HOPEFUL"):
+def test_limbs_that_come_off_keep_the_bound_by_themselves(seed, large, monkeypatch):
+    """Not only in the mean with what they hung on; what is said is about the pieces. What is large is not made shorter
+    before."""
+    seen, found = bounded_twice(seed, large, 1.0, monkeypatch)
+    (whole, cuts, short), (pieces, more, at_last) = seen
+    assert pieces > whole and more > cuts and found.warnings == (f"of {pieces}",)
+    assert short != large and at_last
+    assert all(one.angle_mean <= 1.36 for one in found.maps) and len(found.charts) >= pieces
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_what_does_not_come_in_pieces_is_made_shorter_all_the_same(large, monkeypatch):
+    seen, found = bounded_twice(3, large, np.inf, monkeypatch)
+    assert [short for *_, short in seen] == ([False, True] if large else [True])
+    assert len({charts for charts, *_ in seen}) == 1
+    assert all(one.angle_mean <= 1.36 for one in found.maps)
+
+
+def bounded_twice(seed, large, fuller, monkeypatch):
+    """The charts and cuts that each call was given whose shear was bounded, and whether what it gave was short; and
+    the map of a body with limbs. fuller : how much more of a texture pieces have to fill."""
+    for name in ("SPRAWLING", "FULL", "HOPEFUL"):
         monkeypatch.setattr(limbs, name, 1.0)
+    monkeypatch.setattr(limbs, "FULLER", fuller)
+    monkeypatch.setattr(pieces, "LARGE", 0 if large else np.inf)
     monkeypatch.setattr("omt_uv.solver.parameterization.shear_bound.COMPACT", 0.1)
     seen, bound_shear = [], unwrap_module.bound_shear
 
     def recorded(search, first, maps, *rest, **named):
-        seen.append((len(first.charts), len(first.found_cuts.edges)))
         found = yield from bound_shear(search, first, maps, *rest, **named)
+        seen.append((len(first.charts), len(first.found_cuts.edges), found.is_short))
         return replace(found, warnings=(f"of {len(first.charts)}",))
 
     monkeypatch.setattr(unwrap_module, "bound_shear", recorded)
-    found = drain(unwrap(meshes.polygon_surface(*with_limbs(seed)), options=UnwrapOptions(max_shear=1.35)))
-    (whole, cuts), (pieces, more) = seen
-    assert pieces > whole and more > cuts and found.warnings == (f"of {pieces}",)
-    assert all(one.angle_mean <= 1.36 for one in found.maps) and len(found.charts) >= pieces
+    return seen, drain(unwrap(meshes.polygon_surface(*with_limbs(seed)), options=UnwrapOptions(max_shear=1.35)))
 
 
 def bars():
