@@ -96,9 +96,7 @@ def test_an_object_gets_among_others_what_it_gets_alone(run, rich, name, more):
 def packed(package, tmp_path_factory):
     """The same file as it is and compressed, with what commands take beside it."""
     folder = tmp_path_factory.mktemp("packed")
-    scenes.open_empty()
-    obj = scenes.bump(4, 3)
-    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.8))
+    obj = scenes.open_bump()
     for name, compress in (("plain", False), ("packed", True)):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"), compress=compress, copy=True)
     (folder / "handles.json").write_text(json.dumps([{"object": obj.name, "vertices": [7], "move": [0, 0, 0.05]}]))

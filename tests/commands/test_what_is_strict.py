@@ -21,9 +21,7 @@ QUICK = ("diagram", "queue", "seams", "test-texture", "weights")
 def sound(package, tmp_path_factory):
     """A folder with a body whose UVs neither fold nor lie on one another."""
     folder = tmp_path_factory.mktemp("sound")
-    scenes.open_empty()
-    obj = scenes.bump(4, 3)
-    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.8))
+    scenes.open_bump()
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "in.blend"))
     return folder
 

@@ -106,6 +106,14 @@ def seen_from_above(obj, scale=1.0, shift=(0.0, 0.0)):
     return (xy[vertex] * scale + shift).astype(np.float32)
 
 
+def open_bump():
+    """A file with a curved patch alone, whose UVs neither fold nor lie on one another."""
+    open_empty()
+    obj = bump(4, 3)
+    set_uv(obj, seen_from_above(obj, 0.8))
+    return obj
+
+
 def pin(obj, vertices, layer="UVMap"):
     """Pin all corners of vertices of an object in Object Mode; returns the corners (c,) bool."""
     pinned = np.array([loop.vertex_index in vertices for loop in obj.data.loops])

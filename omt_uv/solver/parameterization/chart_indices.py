@@ -169,13 +169,13 @@ def chart_of_polygons(charts: list[Chart], count: int) -> np.ndarray:
     return found
 
 
-def with_entangled(charts: list[Chart], chosen: np.ndarray, others: list[Chart], count: int) -> np.ndarray:
-    """Charts (k,) bool that are chosen, or hang together with one that is by other charts of the same polygons, of
-    which there are so many, that have some of both, as where faces lie on each other."""
-    faces = np.concatenate([chart.faces for chart in others])
+def with_entangled(region: np.ndarray, chosen: np.ndarray, others: list[Chart]) -> np.ndarray:
+    """Charts (k,) bool, of which polygons are in these (f,), that are chosen, or hang together with one that is by
+    other charts of the same polygons, that have some of both, as where faces lie on each other."""
+    faces, count = np.concatenate([chart.faces for chart in others]), len(chosen)
     other = np.repeat(np.arange(len(others)), [len(chart.faces) for chart in others])
-    label = graph_components(chart_of_polygons(charts, count)[faces], len(charts) + other, len(charts) + len(others))[1]
-    return np.isin(label[: len(charts)], label[: len(charts)][chosen])
+    label = graph_components(region[faces], count + other, count + len(others))[1][:count]
+    return np.isin(label, label[chosen])
 
 
 def refuse_lost_faces(before: list[Chart], after: list[Chart]) -> None:

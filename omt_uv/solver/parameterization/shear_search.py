@@ -324,13 +324,13 @@ class Round:
     def merged(self, search: ShearSearch, new: Round, of: np.ndarray, stay: np.ndarray) -> Round:
         """A new round, but for the charts of this one that stay (k,) bool as they are, and those entangled with them;
         of: see `chart_of`."""
-        stay = with_entangled(self.charts, stay, new.charts, search.count)
+        region = chart_of_polygons(self.charts, search.count)
+        stay = with_entangled(region, stay, new.charts)
         charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
         maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
         edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
         edges = edges[np.isin(pair_keys(*edges.T), np.concatenate([outline(chart) for chart in charts]))]
         # What was found for parts that are as they were is forgotten.
-        region = chart_of_polygons(self.charts, search.count)
         memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
         memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
         cuts = joined(search, self.cuts, edges)

@@ -528,7 +528,7 @@ def test_charts_are_entangled_by_others_with_parts_of_both():
         (charts([0, 2], [1], [3, 5], [4], [6]), [3], [3]),
         (charts([0, 2], [1], [3, 5], [4], [6]), [], []),
     ):
-        found = with_entangled(before, np.isin(np.arange(4), chosen), others, 7)
+        found = with_entangled(chart_of_polygons(before, 7), np.isin(np.arange(4), chosen), others)
         assert np.flatnonzero(found).tolist() == staying
     assert chart_of_polygons(before, 8).tolist() == [0, 0, 1, 1, 2, 2, 3, -1]
     refuse_lost_faces(before, charts([6, 5, 4], [3, 2], [1, 0]))
