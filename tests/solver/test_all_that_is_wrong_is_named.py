@@ -167,6 +167,21 @@ def test_faces_of_a_body_that_are_missing_turned_doubled_or_broken_are_named(cou
     np.testing.assert_array_equal(caught.value.elements, len(W) + np.arange(count))
 
 
+@pytest.mark.parametrize("ask", [closed_surface, lambda points, faces: checked(points, faces, "source")])
+@pytest.mark.parametrize("first", [0, 1, 3])
+def test_all_parts_but_the_largest_are_named_wherever_it_stands(first, ask):
+    parts = [blob(1, seed=k) for k in range(3)]
+    parts.insert(first, BODY)
+    sizes, before = ([len(part[k]) for part in parts] for k in (1, 0))
+    start = np.cumsum([0, *before[:-1]])
+    faces = np.concatenate([G + n for (_, G), n in zip(parts, start, strict=True)])
+    with pytest.raises(MeshError, match="4 parts") as caught:
+        ask(np.concatenate([W for W, _ in parts]), faces)
+    assert caught.value.kind == "face"
+    expected = np.flatnonzero(np.repeat(np.arange(4), sizes) != first)
+    np.testing.assert_array_equal(caught.value.elements, expected)
+
+
 @pytest.mark.parametrize("of", ["source", "charts"])
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_edges_between_faces_that_disagree_or_are_too_many_are_named(count, of):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from types import SimpleNamespace
 
@@ -92,11 +93,13 @@ def test_a_fold_beside_a_face_without_area_has_no_angle():
     assert fold_angles(V, F, np.column_stack(pair_up(pair_keys(tail, head)))).tolist() == [0.0]
 
 
-def test_values_jump_where_corners_of_an_edge_differ():
+@pytest.mark.parametrize("over", list(itertools.product([False, True], repeat=3)))
+def test_values_jump_where_corners_of_an_edge_differ_whichever_way_faces_look(over):
     F = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
     values = np.zeros((9, 2))
     values[[3, 8]] = [[0, 0.2], [0.1, 0]]
     corners = np.arange(9).reshape(3, 3)
+    F, corners = (np.where(np.array(over)[:, None], x[:, ::-1], x) for x in (F, corners))
     for tolerance, jumps in ((0.05, {(1, 2)}), (0.15, {(1, 2)}), (0.25, set())):
         assert {tuple(sorted(e)) for e in value_jumps(F, corners, values, tolerance).tolist()} == jumps
     assert edge_union(np.array([[3, 1], [2, 5]]), np.array([[1, 3]]), np.zeros((0, 2), int)).tolist() == [

@@ -66,6 +66,16 @@ def test_equal_islands_lie_on_one_another():
     assert stacks(jobs, mirrored=False).stack.tolist() == [0, 1, 0, 3]
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_whatever_numbers_its_vertices_have_an_island_lies_on_the_first(mirrored):
+    V, _, F = grid(4, 3)
+    order = np.random.default_rng(0).permutation(len(V))
+    renumbered = np.argsort(order)[F]
+    assert (order[order] != np.arange(len(V))).any()
+    done = stacks([(V, F, V[:, :2]), (V[order] @ turn(2, mirrored) + 4, renumbered, V[order][:, :2] + 9)])
+    np.testing.assert_allclose(done.uv[1], V[order][:, :2], atol=1e-12)
+
+
 @pytest.mark.parametrize("stacked", [False, True])
 def test_the_halves_of_a_pair(stacked):
     V, _, F = grid(4, 3)

@@ -78,6 +78,16 @@ def test_some_turned_faces_are_turned_back():
     assert not orientations(right, area)[0].any()
 
 
+def test_what_looks_to_either_side_with_as_much_area_looks_one_way_in_the_end():
+    V, F = meshes.grid(4, 4)
+    for wrong in (np.arange(len(F)) % 2 == 0, np.arange(len(F)) < len(F) // 2):
+        gluing = glued(V, np.where(wrong[:, None], F[:, ::-1], F))
+        for area in (np.ones(len(F)), np.zeros(len(F))):
+            turned, one_sided = orientations(gluing, area)
+            assert turned.sum() == len(F) / 2 and not one_sided.any()
+            assert gluing.parallel().any() and not turn_over(gluing, turned).parallel().any()
+
+
 def test_a_moebius_strip_has_one_side():
     n = 12
     a, b = np.arange(n), n + np.arange(n)
