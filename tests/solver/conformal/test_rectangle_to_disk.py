@@ -1,10 +1,13 @@
 """Rectangles to disks: the circle, the corners, the symmetries of a rectangle."""
 
+import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.conformal.rectangle_to_disk import MAX_ASPECT, centre_in_disk, rectangle_to_disk
+from omt_uv.solver.conformal.rectangle_to_disk import MAX_ASPECT, centre_in_disk, centred_sites, rectangle_to_disk
 from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.mesh.geometry import halfedge_lengths
+from omt_uv.solver.mesh.topology import boundary_loops
 
 HEIGHTS = [0.3, 1.0, 2.5]
 
@@ -60,3 +63,15 @@ def test_centring_brings_the_mean_to_0_and_keeps_the_circle_and_cross_ratios():
         (z[0] - z[50]) * (z[1] - z[60]) / ((z[0] - z[60]) * (z[1] - z[50])) for z in (p @ [1, 1j], moved @ [1, 1j])
     ]
     assert ratio[0] == pytest.approx(ratio[1])
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_sites_are_centred_only_where_the_nearest_of_them_stay_far_enough_apart(share):
+    sites, F = meshes.polar(lambda r: r, lambda r: 0 * r)
+    sites, loop = sites[:, :2] / np.linalg.norm(sites, axis=1).max(), boundary_loops(F)[0]
+    mass = 0.1 + (sites[:, 0] > 0.3)
+    centred = centred_sites(sites, mass, F, loop, 0.0)
+    assert np.linalg.norm(mass @ centred) < 1e-6 < 1 < np.linalg.norm(mass @ sites)
+    np.testing.assert_allclose(np.linalg.norm(centred[loop], axis=1), 1, atol=1e-12)
+    least = share * halfedge_lengths(centred, F).min()
+    np.testing.assert_array_equal(centred_sites(sites, mass, F, loop, least), centred if share < 1 else sites)

@@ -323,6 +323,21 @@ def test_level_parts_look_one_way_and_are_not_quite_flat():
         assert found.shape == (len(F),) and (found == level).all()
 
 
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("share, filled", [(0.9, 1), (1.1, 0)])
+def test_holes_of_what_looks_one_way_are_small_by_the_area_of_a_disk_that_is_as_long_around(share, filled, size):
+    radius = np.sqrt(share * hole_filling.SMALL / (1 + share * hole_filling.SMALL))
+    V, F = meshes.annulus(60, 6)
+    angle, out = np.arctan2(V[:, 1], V[:, 0]), np.linalg.norm(V[:, :2], axis=1)
+    out = radius + (1 - radius) * (out - out.min()) / np.ptp(out)
+    V = size * np.column_stack([out * np.cos(angle), out * np.sin(angle), 0.05 * np.sin(3 * angle) * out**2])
+    gluing = gluing_of(V, F)
+    level = hole_filling.level_parts(gluing, V)
+    assert level.parts.all()
+    found = hole_filling.hole_boundaries(V, gluing, np.zeros(len(F), bool), 32, level)
+    assert len(np.unique(found[1])) == filled
+
+
 def test_tips_are_ends_inside():
     V, F = meshes.grid(4, 4)
     component = component_of(V, F)

@@ -38,6 +38,16 @@ def test_a_filled_hole_leaves_the_faces_and_adds_a_fan():
     )
 
 
+@pytest.mark.parametrize("options", [{}, {"fill_holes": True}, {"sieve": 0}])
+def test_what_is_repaired_is_said_whether_seams_are_added_or_not(options):
+    V, F = meshes.bumpy(6, 5)
+    F = np.concatenate([F, F[[7], ::-1]])
+    (plain,), (kept,) = (
+        cut_to_disks(triangle_surface(V, F), seams=s, **options).warnings for s in ("auto", "existing")
+    )
+    assert plain == kept
+
+
 @pytest.mark.parametrize("scale", [1e-200, 1.0, 1e307])
 @pytest.mark.parametrize("offset", [[0, 0, 0], [3, -1, 2]])
 def test_lines_are_no_area_wherever_they_lie_and_however_large_they_are(scale, offset):

@@ -46,6 +46,23 @@ def test_a_long_strip_is_unrolled():
     np.testing.assert_allclose(halfedge_lengths(np.column_stack([uv, 0 * uv[:, 0]]), F), length, rtol=1e-8)
 
 
+def test_what_curves_in_small_patches_disagrees_there_alone_where_the_tree_crosses_long_edges():
+    """Three sides of a box that bevels join, slit along one of these to the small triangle at the corner."""
+    b = 0.02
+    side = np.array([[b, b, 0], [1, b, 0], [1, 1, 0], [b, 1, 0]])
+    V = np.concatenate([np.roll(side, k, axis=1) for k in range(3)])
+    faces = [[4 * k + np.array(t) for t in ((0, 1, 2), (0, 2, 3))] for k in range(3)]
+    for one, other in ((0, 1), (1, 2)):
+        # The last edge of the one and the first of the other lie beside one another.
+        a, d, c, e = 4 * one, 4 * one + 3, 4 * other, 4 * other + 1
+        faces.append([np.array([a, d, e]), np.array([a, e, c])])
+    faces.append([np.array([0, 4, 8])])
+    F = np.array([t for some in faces for t in some])
+    _, gap = developed(V, F, across_long=True)
+    corner = np.isin(np.arange(len(V)), [0, 4, 8])
+    assert gap[corner].max() > 1e-4 and gap[~corner].max() < 1e-12
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_a_disk_without_curvature_is_unrolled_whatever_its_size(scale):
     V, F = meshes.bumpy(20, 6)
