@@ -31,6 +31,17 @@ def test_transparent_pixels_do_not_darken_what_is_beside_them():
     np.testing.assert_allclose(after[seen][:, :3], np.tile([0.8, 0.6, 0.4], (seen.sum(), 1)), atol=1e-12)
 
 
+@pytest.mark.parametrize("alpha", [0.0, 0.25, 1.0])
+def test_colours_are_warped_alike_by_whatever_alpha_they_have_all_over(alpha):
+    """What cannot be seen now may be seen once its alpha is changed."""
+    picture = np.random.default_rng(0).random((32, 32, 4))
+    picture[..., 3] = alpha
+    uv, F = square(8)
+    moved = uv[F] * 0.93 + 0.03
+    straight, plain = (warp_image(picture, uv[F], moved, straight=way) for way in (True, False))
+    np.testing.assert_allclose(straight, plain, atol=1e-12)
+
+
 @pytest.mark.parametrize("shift", [(3, 0), (0, -5), (64, 0)])
 def test_a_shift_by_whole_pixels_is_exact_and_repeats(shift):
     picture = np.random.default_rng(0).random((64, 64, 3))

@@ -225,6 +225,29 @@ def test_the_closest_passing_by_hand():
     assert Passing(9.0, (-1, -1), 0.1).warning([], 9.0, np.array([[0, 1]])) == ()
 
 
+@pytest.mark.parametrize("chords", [1, 2, 3, 16])
+def test_a_passing_is_the_same_however_many_chords_the_ways_are_told_in(chords):
+    begin = np.array([[0.0, 0, 0], [0.3, 0.2, 0], [-1, 0.3, 0.1]])
+    way = np.array([[1.0, 0.1, 0], [-0.5, 0, 0], [2, 0, 0]])
+    time = np.linspace(0, 1, chords + 1)[:, None, None]
+    owner = np.array([0, 1, 2])
+    found, plain = (closest_passing(begin + t * way, owner, 0.3) for t in (time, time[[0, -1]]))
+    assert found.handles == plain.handles
+    assert (found.strength, found.distance) == pytest.approx((plain.strength, plain.distance), rel=1e-9)
+
+
+def test_the_surge_is_that_of_what_flows_along_at_the_places_that_it_comes_to():
+    """Of steps whose field takes everything to the right, and is faster the farther to the right."""
+
+    def field(points):
+        return np.array([1.0, 0, 0]) * (1 + points[:, :1])
+
+    steps = [integration.FlowStep(0.25, (field,) * 3) for _ in range(4)]
+    path = np.array([[[0.0, 0, 0]], [[2.0, 0, 0]]])
+    # At x after a time t, 1 + x is exp(t) times what it was.
+    assert greatest_surge(path, steps, np.zeros((1, 3))) == pytest.approx(np.exp(0.75) / 2, rel=1e-3)
+
+
 def test_the_surge_is_the_speed_over_that_of_the_handles():
     steps = [integration.FlowStep(0.5, (Turning(k),) * 3) for k in (1.0, 6.0)]
     path = np.array([[[0.0, 0, 0]], [[1.0, 0, 0]], [[1.0, 4, 0]]])

@@ -77,6 +77,22 @@ def test_equirectangular_faces_keep_the_areas_of_their_images():
     assert 0.9 < target.sum() < 1
 
 
+def test_faces_at_a_pole_keep_what_they_have_and_what_folds_beside_it_gets_the_area_of_its_image():
+    P, F = random_sphere(900, 1)
+    polygons = triangle_polygons(F)
+    unfolded, points = unfold(P, polygons, EQUIRECT)
+    moved = unfolded.uv.copy()
+    # All rows in the place of the row opposite: every face is folded.
+    moved[:, 1] = 1 - moved[:, 1]
+    turned = unfolded.with_points(moved)
+    straight = signed_areas(turned.corners(), polygons.triangles)
+    target = equirectangular_areas(points, turned, polygons)
+    at_pole = turned.poles[turned.index][polygons.triangles].any(axis=1)
+    assert 0 < at_pole.sum() < len(F) and (straight < 0).mean() > 0.9
+    np.testing.assert_array_equal(target[at_pole], straight[at_pole])
+    assert (target[~at_pole] > 0).all()
+
+
 def test_lengths_on_the_sphere_are_those_of_the_projection():
     """Squared lengths of the unit directions beside differences of the points that a cylinder stands for."""
     rng = np.random.default_rng(0)
