@@ -1,6 +1,7 @@
 """Many charts take their steps together, and each its own decisions."""
 
 import numpy as np
+import pytest
 
 from omt_uv.solver.refinement.batch_continuation import AreaErrors, BatchContinuation
 from omt_uv.solver.refinement.continuation_rules import FIRST_PRESSURE, QUALITIES, SPARE, SQUEEZED
@@ -58,6 +59,21 @@ def test_a_chart_that_has_its_areas_is_solved_and_stays():
     before = continuation.area_weight.copy()
     promise(continuation, 0.5, 0.5)
     np.testing.assert_array_equal(continuation.area_weight, before)
+
+
+@pytest.mark.parametrize("gained, solved", [(True, False), (False, True)])
+def test_greater_weights_are_of_use_while_stages_gain_whatever_their_last_steps_do(gained, solved):
+    """A stage is compared with the one before it, not with its own last step."""
+    continuation = batch(np.ones(1))
+    stages = len(QUALITIES["standard"].area_weights)
+    for stage in range(stages):
+        error = 0.5**stage if gained or stage < stages - 1 else 0.5 ** (stage - 1)
+        # All is gained by the first step, and the others converge.
+        weight = continuation.area_weight[0]
+        promise(continuation, 0.5, error)
+        while continuation.live.all() and continuation.area_weight[0] == weight:
+            promise(continuation, 1e-9, error)
+    assert continuation.solved.all() == solved and continuation.live.all() != solved
 
 
 def test_a_chart_that_no_step_helps_is_given_back():

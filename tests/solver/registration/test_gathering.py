@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bodies import icosphere
+from meshes import polar
 
 from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.progress import drain
@@ -50,6 +51,23 @@ def test_a_ball_that_few_faces_cover_gets_more():
     np.testing.assert_array_equal(after.positions[pair.landmarks], before.positions[pair.landmarks])
     far = P[pair.order][:, 2] < 0
     np.testing.assert_array_equal(after.domain[far], before.domain[far])
+
+
+def test_the_boundary_and_landmarks_stay_while_vertices_gather_beside_them():
+    P, F = polar(lambda t: t, lambda t: 0 * t, 6, 18)
+    Q, G = polar(lambda t: t, lambda t: 0 * t, 30, 90)
+    away = np.linalg.norm(Q[:, :2] - [0.7, 0], axis=1)
+    target = Q + np.maximum(0, 1 - away / 0.25)[:, None] * [0, 0, 0.6]
+    marks = ([20, 40], [int(np.linalg.norm(Q - P[k], axis=1).argmin()) for k in (20, 40)])
+    pair = prepared((P, F), (target, G), vertex_landmarks((marks[0], F), (marks[1], G)), "auto")
+    assert pair.domain == "disk" and len(pair.loop) == 18
+    carrier = TargetCarrier(pair.target.vertices, pair.target.triangles, Q[:, :2], pair.loop)
+    before = carrier.place(carrier.within(P[pair.order, :2]))
+    after = drain(gathered(Case(pair, P[pair.order, :2], carrier, None), before, CLOSE))
+    stay = np.concatenate([pair.loop, pair.landmarks])
+    np.testing.assert_array_equal(after.positions[stay], before.positions[stay])
+    moved = np.linalg.norm(after.domain - before.domain, axis=1)
+    assert (moved > 0.01).sum() > 5 and not carrier.folded(after, pair.triangles).any()
 
 
 def test_what_is_close_stays_as_it_is():

@@ -19,7 +19,7 @@ from omt_uv.solver.errors import (
 )
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
-from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes
+from omt_uv.solver.mesh.spherical_geometry import fibonacci_sphere, normalized, signed_volumes
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
@@ -54,6 +54,19 @@ def test_the_search_finds_a_rotation_of_functions():
     assert np.trace(found.rotation @ R.T) > 1 + 2 * np.cos(np.radians(4))
     turned = alignment.turn_by_search((P[:, :2], values), (P[:, :2] @ [[0, 1], [-1, 0]], values))
     assert abs(turned.turn - 1j) < 0.05
+
+
+def test_functions_are_sampled_where_vertices_are_and_between_them_by_the_nearest():
+    P = fibonacci_sphere(300)
+    values = np.random.default_rng(0).random((300, 2))
+    same = alignment._Sampled(P, values, 300)
+    np.testing.assert_allclose(same.values, values, atol=1e-6)
+    turn = np.diag([1.0, -1, -1])
+    np.testing.assert_allclose(alignment._Sampled(P @ turn, values, 300, turn).values, values, atol=1e-6)
+    # Of a smooth function, what is near differs little: of one vertex alone by the way to it, and of several by less.
+    between = alignment._Sampled(P, P, 2000)
+    off = np.linalg.norm(between.values - between.points, axis=1).mean()
+    assert off < 0.7 * between.tree.query(P)[0].max() + 0.7 * np.sqrt(4 * np.pi / 300) / 2
 
 
 def test_rotations_of_the_grid_are_proper():

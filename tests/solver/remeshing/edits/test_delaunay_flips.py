@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import meshes
 import numpy as np
 import pytest
@@ -65,3 +67,14 @@ def test_single_flips_are_made_only_where_faces_stay_upright():
         T = F.copy()
         assert len(flip_if_valid(V2, T, np.array([2]), kept, outer)) == 0
         np.testing.assert_array_equal(T, F)
+
+
+@pytest.mark.parametrize("outer", list(itertools.product([False, True], repeat=4)))
+def test_a_flip_joins_any_two_vertices_but_two_outer_ones(outer):
+    V = np.array([[0.0, 0, 0], [1, -0.2, 0], [1, 1, 0], [0.2, 0.9, 0]])
+    F, outer = np.array([[0, 1, 2], [0, 2, 3]]), np.array(outer)
+    joined = not (outer[1] and outer[3])
+    assert len(flip_if_valid(V, F.copy(), np.array([2]), np.zeros(6, dtype=bool), outer)) == joined
+    V[[1, 3]] = V[[1, 3]] / 4 + 0.375
+    T = F.copy()
+    assert make_delaunay_embedded(V, T, twins(T), NONE, outer=outer) == joined
