@@ -117,11 +117,13 @@ def test_islands_are_those_on_which_a_region_begins_or_ends(monkeypatch):
     assert caught.value.index == 0 and "eyes" in str(caught.value)
 
 
-def test_shares_of_all_islands_are_by_their_areas():
+@pytest.mark.parametrize("grown", [1, 3])
+def test_shares_of_all_islands_are_by_the_areas_that_they_had(grown):
     def one(scale, weights, here, target):
         island = island_of(scale)
         result = SimpleNamespace(
-            uv=island.uv * [1, 1], target=SimpleNamespace(target_shares=np.array(target), density=np.ones(2))
+            uv=island.uv * [1, grown if scale > 1 else 1],
+            target=SimpleNamespace(target_shares=np.array(target), density=np.ones(2)),
         )
         return several._JointIsland(0, island, np.array(weights, float), np.array(here), result)
 

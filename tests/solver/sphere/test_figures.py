@@ -36,6 +36,15 @@ def test_means_are_those_of_the_triangles_one_by_one():
     assert found.symmetric_area == pytest.approx(np.mean(ratio + 1 / ratio)) and found.area_l1 > 0.1
 
 
+def test_the_mean_shear_is_that_of_what_does_not_fold():
+    V, F = ellipsoid()
+    positions = V / np.linalg.norm(V, axis=1)[:, None]
+    folded = F.copy()
+    folded[::9] = folded[::9, ::-1]
+    found, rest = (sphere_figures(V, faces, positions) for faces in (folded, np.delete(F, np.s_[::9], axis=0)))
+    assert found.folds == len(F[::9]) and found.angle_mean == pytest.approx(rest.angle_mean, rel=1e-12)
+
+
 def test_moser_alone_has_areas_nearly_and_the_flow_takes_cost_off_it():
     V, F = ellipsoid()
     moser, flow = (drain(sphere_map(V, F, method=method)) for method in ("moser", "flow"))

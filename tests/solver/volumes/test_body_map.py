@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 
 import numpy as np
@@ -174,6 +175,26 @@ def test_edges_inside_are_split_in_their_middle_and_the_surface_stays(body):
     assert np.array_equal(*keys)
     for places in ((finer.points, found.points), (positions, found.positions)):
         assert np.isclose(*(tet_volumes(x, mesh.tets).sum() for x, mesh in zip(places, (finer, found), strict=True)))
+
+
+def test_the_edge_inside_that_is_split_is_the_longest_in_the_body_and_at_its_places_together(body):
+    _, _, found = body
+    places = np.concatenate([found.points, found.positions * [1, 1, 4]], axis=1)
+    surface = {tuple(e) for e in np.sort(boundary_triangles(found.tets)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)).tolist()}
+
+    def length(edge):
+        way = places[edge[0]] - places[edge[1]]
+        return np.linalg.norm(way[:3]) + np.linalg.norm(way[3:])
+
+    for t in np.random.default_rng(0).permutation(len(found.tets))[:12]:
+        inside = set(itertools.combinations(np.sort(found.tets[t]).tolist(), 2)) - surface
+        finer, positions = split_inside(
+            TetMesh(found.points, found.tets), places[:, 3:], np.arange(len(found.tets)) == t
+        )
+        assert len(finer.points) == len(found.points) + bool(inside)
+        if inside:
+            middle = places[list(max(inside, key=length))].mean(axis=0)
+            np.testing.assert_allclose(np.append(finer.points[-1], positions[-1]), middle, atol=1e-12)
 
 
 def test_what_has_no_room_is_given_some(body):
