@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.mesh.charts import strict_charts, triangle_rows
 from omt_uv.solver.mesh.geometry import signed_areas
@@ -80,6 +81,20 @@ def test_errors_have_the_elements_of_the_surface():
             found = located(FoldedUVError("cause", "remedy", kind=kind, elements=np.array(elements)), chart)
             np.testing.assert_array_equal(found.elements, expected)
             assert isinstance(found, FoldedUVError) and (found.cause, found.remedy) == ("cause", "remedy")
+
+
+def test_what_fills_a_hole_is_no_element_of_the_surface_nor_is_what_leads_there():
+    V, F = meshes.annulus(12, 2)
+    (chart,) = cut_to_disks(triangle_surface(V, F), fill_holes=True).charts
+    (middle,) = np.flatnonzero(chart.vertex_ids < 0)
+    rim = np.setdiff1d(chart.patches, middle)
+    for kind, elements, expected in (
+        ("vertex", np.append(rim, middle), chart.vertex_ids[rim]),
+        ("edge", [[rim[0], middle], rim[:2], [middle, rim[2]], rim[2:4]], chart.vertex_ids[rim[:4].reshape(2, 2)]),
+        ("face", np.array([4, len(F), 2, len(F) + 11]), np.sort(chart.faces[[4, 2]])),
+    ):
+        found = located(FoldedUVError("cause", "remedy", kind=kind, elements=np.array(elements)), chart)
+        np.testing.assert_array_equal(found.elements, expected)
 
 
 def shuffled(chart, seed):
