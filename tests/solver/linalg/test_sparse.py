@@ -62,6 +62,21 @@ def test_an_order_is_found_anew_once_vertices_far_from_each_other_meet(many, mon
     assert entries[2] == entries[3] if many else entries[2] > max(1.2 * entries[0], entries[3])
 
 
+def test_an_order_is_found_anew_however_slowly_factors_fill():
+    V, F = meshes.head(24)
+    order = minimum_degree(cotangent_laplacian(V, F))
+    matrix = sp.kron(cotangent_laplacian(V, F)[order][:, order] + 0.1 * sp.identity(len(V)), np.ones((2, 2)), "csc")
+    matrix = (matrix + sp.identity(2 * len(V))).tocsc()
+    rng, orders, entries = np.random.default_rng(0), FillOrder(), []
+    while orders.order is not None and isinstance(orders.order, str) and len(entries) < 200:
+        entries.append(orders.factor(matrix).entries)
+        form = sp.csr_matrix(([1.0, -1.0], ([0, 0], 2 * rng.integers(len(V), size=2))), (1, 2 * len(V)))
+        matrix = (matrix + form.T @ form).tocsc()
+    # Each has hardly more than the one before, and the last much more than the first.
+    assert len(entries) > 3 and max(np.divide(entries[1:], entries[:-1])) < sparse.FILLED
+    assert entries[-1] > sparse.FILLED * entries[0] >= entries[-2]
+
+
 def test_fill_is_that_of_the_order_given():
     n = 12
     path = sp.diags([np.ones(n - 1), np.ones(n), np.ones(n - 1)], [-1, 0, 1])

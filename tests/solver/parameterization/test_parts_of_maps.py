@@ -14,6 +14,7 @@ from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.straight_paths import TURN
 from omt_uv.solver.cutting import component_order
 from omt_uv.solver.cutting.cuts import Cuts
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import MeshError, PinError
 from omt_uv.solver.mesh.charts import Chart, part_of_chart
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
@@ -1156,6 +1157,18 @@ def test_charts_that_are_as_before_keep_their_maps():
 def flat_map(V, **given):
     figures = {"area_l1": 0.0, "area_sd": 0.0, "angle_mean": 1.0, "folds": 0, "status": "converged"}
     return ChartMap(uv=V[:, :2].copy(), **{**figures, **given})
+
+
+def test_what_fills_a_hole_goes_with_what_is_all_around_it():
+    V, F = meshes.annulus(12, 3)
+    (whole,) = cut_to_disks(triangle_surface(V, F), fill_holes=True).charts
+    middle = V[F].mean(axis=1)
+    inside = np.linalg.norm(middle, axis=1) < np.median(np.linalg.norm(middle, axis=1))
+    for rows, filled in ((inside, True), (np.ones(len(F), bool), True), (middle[:, 0] > 0, False), (~inside, False)):
+        part, used = part_of_chart(whole, rows[whole.faces])
+        assert len(part.patches) == (12 if filled else 0) and (part.vertex_ids < 0).sum() == filled
+        np.testing.assert_array_equal(whole.vertices[used], part.vertices)
+        np.testing.assert_array_equal(np.sort(part.faces), np.flatnonzero(rows))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
 """Newton's steps: they go down, fold nothing, and keep to the curves on which vertices slide."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -83,6 +86,17 @@ def test_newton_direction_descends_along_the_motion(kind):
     difference = (problem.energy(motion.move(w, h * step)) - problem.energy(motion.move(w, -h * step))) / (2 * h)
     assert slope < 0
     assert difference == pytest.approx(slope, rel=1e-4)
+
+
+def test_what_follows_a_step_has_its_energy_where_it_leaves_the_map():
+    V, F = meshes.bumpy()
+    w, still = complex_map(V, F), np.zeros(len(V), bool)
+    smoother = SimpleNamespace(smoothed=lambda faces, w, weight: 1.01 * w)
+    plain = NewtonProblem(elements_of(V, F), Assembly(F, len(w)), FreeMotion(still), 5.0)
+    one, other = (problem.step(w, plain.energy(w), 0.0) for problem in (plain, replace(plain, smoother=smoother)))
+    np.testing.assert_array_equal(other.w, 1.01 * one.w)
+    assert other.energy == plain.energy(other.w) != one.energy == plain.energy(one.w)
+    assert (other.decrement, other.share) == (one.decrement, one.share)
 
 
 def test_newton_converges_fast_near_its_minimum():

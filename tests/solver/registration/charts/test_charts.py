@@ -105,6 +105,8 @@ def test_options_are_those_of_every_match(tori):
     W, G = V * [-1, 1, 1], F[:, [0, 2, 1]]
     found = drain(register_charts((V, F, seams), (W, G, seams), None, RegistrationOptions("charts", mirrored=True)))
     assert np.linalg.norm(found.forward.positions(W, G) - W, axis=1).max() < 0.05
+    # And back onto the source as it was given.
+    assert np.linalg.norm(found.backward.positions(V, F) - V, axis=1).max() < 0.05
 
 
 def test_points_at_vertices_are_those_all_of_whose_weight_is_at_one():

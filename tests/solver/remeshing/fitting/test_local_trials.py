@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.mesh.closest_point import ClosestPoint, ClosestPointTracker
+from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.remeshing.edits.working_mesh import WorkingMesh
 from omt_uv.solver.remeshing.fitting.closest_pairs import Pairing
 from omt_uv.solver.remeshing.fitting.fit_state import FitState
@@ -61,6 +62,20 @@ def test_copies_are_as_the_mesh(setting):
     np.testing.assert_allclose(norm[1:], norm[:-1])
     shape = patch_shapes(trial.points, trial.triangles, batch.owner, p)
     assert shape.angle.shape == (COPIES, p) and acceptable(shape, shape).all()
+
+
+def test_features_and_edges_that_were_flipped_stay_from_then_on(setting):
+    state, pairs, patches = setting
+    keys = np.unique(pair_keys(*halfedges(state.triangles)))
+    state = FitState(
+        WorkingMesh(state.points, state.triangles, np.zeros(len(state.points), dtype=bool), keys[::3]),
+        state.pairing, np.ones(len(state.pairing.index.triangles)), ClosestPointTracker(6))  # fmt: skip
+    batch = TrialBatch(state, find_peaks(state, pairs, patches))
+    before, edges = batch.locked, pair_keys(*halfedges(batch.triangles))
+    batch.vary()
+    new = np.setdiff1d(pair_keys(*halfedges(batch.triangles)), edges)
+    assert len(before) and len(new)
+    np.testing.assert_array_equal(batch.locked, np.union1d(before, new))
 
 
 def test_the_best_copy_is_put_back_and_the_rest_stays(setting):
