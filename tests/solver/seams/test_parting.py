@@ -18,6 +18,7 @@ from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
+from omt_uv.solver.seams import parting
 from omt_uv.solver.seams.parting import (
     LEAST_HALF,
     LEAST_PART,
@@ -54,6 +55,20 @@ def test_what_lies_on_itself_comes_apart_along_a_short_cut():
         assert face_areas(part.vertices, part.triangles).sum() > LEAST_PART * whole / 2
     # Straight across is 1.
     assert np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1).sum() < 1.05
+
+
+@pytest.mark.parametrize("again", [0, 1, 3])
+def test_what_has_come_apart_is_not_cut_again(again, monkeypatch):
+    """A corner of one half is apart from all of the other one, however little it costs to cut it off."""
+    V, F = meshes.grid(10, 4, width=2.5)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    x, y = V[F].mean(axis=1)[:, :2].T
+    left, right, corner = x < 0.3, x > 2.2, (x < 0.2) & (y < 0.2)
+    pairs = [(np.flatnonzero(one), np.flatnonzero(right)) for one in (left, *[corner] * again)]
+    monkeypatch.setattr(parting, "_covering", lambda *_: pairs)
+    monkeypatch.setattr(parting, "_enlarged", lambda graph, steps, one, other: (one, other))
+    parts = strict_charts(triangle_surface(V, F, parted(chart, V[:, :2], np.ones(len(V)))))
+    assert len(parts) == 2
 
 
 def test_cuts_avoid_what_is_dear():
