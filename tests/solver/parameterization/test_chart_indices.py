@@ -87,10 +87,10 @@ def test_what_fills_a_hole_is_no_element_of_the_surface_nor_is_what_leads_there(
     V, F = meshes.annulus(12, 2)
     (chart,) = cut_to_disks(triangle_surface(V, F), fill_holes=True).charts
     (middle,) = np.flatnonzero(chart.vertex_ids < 0)
-    rim = np.setdiff1d(chart.patches, middle)
+    ring = np.setdiff1d(chart.patches, middle)
     for kind, elements, expected in (
-        ("vertex", np.append(rim, middle), chart.vertex_ids[rim]),
-        ("edge", [[rim[0], middle], rim[:2], [middle, rim[2]], rim[2:4]], chart.vertex_ids[rim[:4].reshape(2, 2)]),
+        ("vertex", np.append(ring, middle), chart.vertex_ids[ring]),
+        ("edge", [[ring[0], middle], ring[:2], [middle, ring[2]], ring[2:4]], chart.vertex_ids[ring[:4].reshape(2, 2)]),
         ("face", np.array([4, len(F), 2, len(F) + 11]), np.sort(chart.faces[[4, 2]])),
     ):
         found = located(FoldedUVError("cause", "remedy", kind=kind, elements=np.array(elements)), chart)
