@@ -79,7 +79,8 @@ def _turn(edit: bmesh.types.BMesh, _extent: float) -> int:
 
 def _merge(edit: bmesh.types.BMesh, extent: float) -> int:
     count = len(edit.verts)
-    bmesh.ops.remove_doubles(edit, verts=edit.verts[:], dist=TOGETHER * extent)
+    # No vertices are as close as 0 to Blender 4.2, and where all are in one place, any distance will do.
+    bmesh.ops.remove_doubles(edit, verts=edit.verts[:], dist=TOGETHER * (extent or 1.0))
     return count - len(edit.verts)
 
 

@@ -3,8 +3,6 @@ nor what it tells."""
 
 from __future__ import annotations
 
-import importlib
-
 import bpy
 
 import front_runs
@@ -85,29 +83,33 @@ def folder(package, tmp_path_factory):
     return folder
 
 
-def after(folder, capfd, name: str, objects: str, arguments: dict) -> list:
-    """What a run tells and leaves."""
-    twin_scenes.begin(folder, objects)
-    why, lines = twin_scenes.told(capfd, name, arguments)
-    summary = importlib.import_module("omt_uv.session.last_run").state.summary
-    return [why, lines, front_runs.rows_of(summary), twin_scenes.left()]
+@pytest.fixture
+def after(folder, package, capfd):
+    """What a run tells and leaves: `after(name, objects, arguments)`."""
+
+    def run(name: str, objects: str, arguments: dict) -> list:
+        twin_scenes.begin(folder, objects)
+        why, lines = twin_scenes.told(capfd, name, arguments)
+        return [why, lines, front_runs.rows_of(package("session.last_run").state.summary), twin_scenes.left()]
+
+    return run
 
 
 @pytest.mark.parametrize("run", range(len(RUNS)), ids=[f"{name} {list(given.values())[-1]}" for name, _, given in RUNS])
-def test_what_is_not_drawn_does_not_count(folder, capfd, run):
+def test_what_is_not_drawn_does_not_count(after, run):
     name, objects, arguments = RUNS[run]
     others = idle(name, objects, arguments)
     assert others, "every setting counts"
-    plain = after(folder, capfd, name, objects, arguments)
+    plain = after(name, objects, arguments)
     assert plain[0] is None
-    assert after(folder, capfd, name, objects, {**arguments, **others}) == plain, others
+    assert after(name, objects, {**arguments, **others}) == plain, others
     # Nor do names of what is not there.
     others = {
         key: "nowhere"
         for key, value in others.items()
         if isinstance(value, str) and (key in GROUPS or value in objects)
     }
-    assert not others or after(folder, capfd, name, objects, {**arguments, **others}) == plain, others
+    assert not others or after(name, objects, {**arguments, **others}) == plain, others
 
 
 @pytest.mark.parametrize(
@@ -119,9 +121,7 @@ def test_what_is_not_drawn_does_not_count(folder, capfd, run):
     ],
     ids=lambda value: value if isinstance(value, str) and "omt" in value else "",
 )
-def test_no_shear_is_less_than_one_so_that_such_bounds_are_none(folder, capfd, name, objects, arguments):
-    none, *others = (
-        after(folder, capfd, name, objects, {**arguments, "max_shear": bound}) for bound in (0.0, 0.5, 1.0)
-    )
+def test_no_shear_is_less_than_one_so_that_such_bounds_are_none(after, name, objects, arguments):
+    none, *others = (after(name, objects, {**arguments, "max_shear": bound}) for bound in (0.0, 0.5, 1.0))
     assert none[0] is None and others == [none, none]
-    assert after(folder, capfd, name, objects, {**arguments, "max_shear": 1.02}) != none
+    assert after(name, objects, {**arguments, "max_shear": 1.02}) != none

@@ -20,6 +20,10 @@ NOT_OF_THE_FILE = {"rna_type", "id_data", "original", "users", "tag", "is_update
                    "depsgraph", "pixels", "is_dirty", "has_data", "bindcode", "is_runtime_data",
                    "uv_layer_clone", "uv_layer_stencil", "all_objects", "particle_edit",
                    "use_nodes"}  # fmt: skip
+if bpy.app.version < (4, 3):
+    # Blender 4.2 crashes when it reads the brushes of that tool; it makes layers for the others when it reads them, and
+    # takes another UV map for the active one meanwhile.
+    NOT_OF_THE_FILE |= {"uv_sculpt", "vertex_selection", "edge_selection", "pin"}
 # Windows, tools, and what comes with Blender.
 NOT_LOOKED_AT = {"screens", "workspaces", "window_managers", "brushes", "libraries", "fonts", "palettes", "linestyles"}
 # Further than from the view layer of a scene to an object in the collection of a collection nothing goes.
