@@ -18,6 +18,7 @@ ENTRIES_PER_FACE = 40  # the grid is coarsened until its lists are no longer tha
 MOST_ENTRIES = 12_000_000  # or than this in all, where there are not many more faces, for memory
 AT_ONCE = 50_000  # faces whose cells are found at once
 INSIDE = 1e-9  # a point this close to a face's border, relative to the squared extent, is not inside
+ASKED_FIRST = 32  # of the triangles that a cell lists: those of maps that lie on themselves as a whole tell at once
 PAIR_WORK = 12  # comparisons of a point and a face that take as long as one of two faces, and half of them again
 
 
@@ -61,8 +62,8 @@ class _Areas:
         points = _draw(self.triangles, self.area, samples, seed)
         pairs = np.cumsum(self.grid.candidates(points))
         points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
-        covered = [self.grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)])]
-        return float((np.concatenate(covered) > 1).mean())
+        covered = [self.grid.covered_twice(chunk) for chunk in _chunks(points, pairs[: len(points)])]
+        return float(np.concatenate(covered).mean())
 
 
 def covered_share(w: np.ndarray, triangles: np.ndarray, samples: int = SAMPLES) -> float:
@@ -207,16 +208,23 @@ class _Grid:
         cell = self._cell(points)
         return self.start[cell + 1] - self.start[cell]
 
-    def cover(self, points):
-        """In how many triangles each point (k,2) lies."""
-        return np.bincount(self.inside(points)[0], minlength=len(points))
+    def covered_twice(self, points):
+        """Whether each point (k,2) lies in more than one triangle; asks no further of what has been found in two."""
+        listed, number = self.candidates(points), np.zeros(len(points), np.int64)
+        left, begin, end = np.arange(len(points)), 0, ASKED_FIRST
+        while len(left):
+            number[left] += np.bincount(self.inside(points[left], begin, end)[0], minlength=len(left))
+            begin, end = end, 4 * end
+            left = left[(number[left] < 2) & (listed[left] > begin)]
+        return number > 1
 
-    def inside(self, points):
-        """Points (c,) of these (k,2) and the triangle (c,) that each lies in, a pair for every time."""
+    def inside(self, points, begin=0, end=None):
+        """Points (c,) of these (k,2) and the triangle (c,) that each lies in, a pair for every time; of some alone that
+        a cell lists."""
         cell = self._cell(points)
-        begin = self.start[cell]
-        query, k = expand(self.start[cell + 1] - begin)
-        triangle = self.owner[begin[query] + k]
+        first, last = self.start[cell] + begin, self.start[cell + 1]
+        query, k = expand((last if end is None else np.minimum(last, first + end - begin)) - first)
+        triangle = self.owner[first[query] + k]
         limit = INSIDE * self.extent**2
         for i in range(3):
             # What is outside of one side needs no other: most of what a cell lists.

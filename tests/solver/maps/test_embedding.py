@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps import embedding
+from omt_uv.solver.maps import boxes, embedding
 from omt_uv.solver.maps.embedding import check_layout
 from omt_uv.solver.maps.overlap import overlap_share
 
@@ -128,3 +130,31 @@ def test_corners_of_one_vertex_are_one_where_their_uvs_are_and_nowhere_else(far)
     expected = np.unique(np.column_stack([F.ravel(), place]), axis=0, return_inverse=True)[1].ravel()
     assert len(np.unique(found)) == expected.max() + 1
     assert len(np.unique(np.column_stack([found, expected]), axis=0)) == expected.max() + 1
+
+
+def test_thousands_of_triangles_over_one_another_take_little_memory():
+    """As Blender's Reset lays every face: each boundary edge meets each other one."""
+    rng = np.random.default_rng(0)
+    uv = rng.random((3000, 3, 2))
+    turned_over = np.linalg.det(uv[:, 1:] - uv[:, :1]) < 0
+    uv[turned_over] = uv[turned_over][:, ::-1]
+    tracemalloc.start()
+    found = check_layout(np.arange(9000).reshape(-1, 3), uv)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found.overlap > 0.99 and not found.folded.any()
+    assert most < 200e6
+
+
+@pytest.mark.parametrize("size", [0.001, 0.01])
+def test_boxes_that_are_not_crowded_meet_as_any_do(size, monkeypatch):
+    rng = np.random.default_rng(1)
+    low = rng.random((1000, 2))
+    high = low + size * rng.random((1000, 2))
+    for swept in (boxes.SWEPT_PER_BOX, 0):
+        monkeypatch.setattr(boxes, "SWEPT_PER_BOX", swept)
+        for one, other in zip(boxes.own_pairs(low, high), boxes.box_pairs(low, high, low, high), strict=True):
+            np.testing.assert_array_equal(one, other)
+    monkeypatch.setattr(boxes, "CROWDED", 1)
+    assert boxes.own_pairs(low, high) is None
+    assert boxes.own_pairs(low[:0], high[:0])[0].size == 0

@@ -91,6 +91,19 @@ def test_samples_are_looked_at_in_parts_of_any_size(chunk, monkeypatch):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize("first", [1, 3, 10**6])
+def test_who_is_asked_first_decides_nothing(first, monkeypatch):
+    """Triangles by chance, of which dozens lie in a cell, and points in none, in one and in many."""
+    rng = np.random.default_rng(2)
+    uv = rng.random((300, 1, 2)) + 0.12 * rng.normal(size=(300, 3, 2))
+    points = rng.random((500, 2))
+    point, _ = overlap.cover_pairs(uv, points)
+    number = np.bincount(point, minlength=len(points))
+    monkeypatch.setattr(overlap, "ASKED_FIRST", first)
+    np.testing.assert_array_equal(overlap._Grid(uv).covered_twice(points), number > 1)
+    assert set(number[number < 3]) == {0, 1, 2} and number.max() > 5
+
+
 def test_a_coarser_grid_finds_the_same(monkeypatch):
     """Long triangles lie in many cells, and lists of these would fill the memory."""
     rng = np.random.default_rng(0)
