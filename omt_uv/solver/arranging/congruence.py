@@ -45,7 +45,7 @@ def matching(V: np.ndarray, F: np.ndarray, V2: np.ndarray, F2: np.ndarray) -> Ma
     if V.shape != V2.shape or F.shape != F2.shape or not len(V):
         return None
     P, Q = V - V.mean(axis=0), V2 - V2.mean(axis=0)
-    near = TOLERANCE * max(float(np.ptp(P, axis=0).max()), 1e-300)
+    near = nearness(P)
     r, s = np.linalg.norm(P, axis=1), np.linalg.norm(Q, axis=1)
     if np.abs(np.sort(r) - np.sort(s)).max() > near:
         return None
@@ -77,8 +77,12 @@ def mirrored_match(
     if V.shape != V2.shape or F.shape != F2.shape or not len(V):
         return None
     image = V - 2 * (V @ normal - at)[:, None] * normal
-    near = TOLERANCE * max(float(np.ptp(V, axis=0).max()), 1e-300)
-    return _checked(image, cKDTree(V2), F, F2, near)
+    return _checked(image, cKDTree(V2), F, F2, nearness(V))
+
+
+def nearness(V: np.ndarray) -> float:
+    """How near to one another vertices that correspond lie, of a surface with positions (n,3)."""
+    return TOLERANCE * max(float(np.ptp(V, axis=0).max()), 1e-300)
 
 
 def _frame(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..errors import FoldedUVError, MeshError
 from ..mesh.geometry import signed_areas
-from .congruence import mirrored_match
+from .congruence import mirrored_match, nearness
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,15 @@ def halves(
     """
     partner = np.full(len(islands), -1)
     uv = [np.array(place, float) for *_, place in islands]
-    centre = np.array([V.mean(axis=0) @ normal - at for V, *_ in islands])
+    middle = np.array([V.mean(axis=0) for V, *_ in islands]).reshape(-1, 3)
+    centre = middle @ normal - at
+    tree, images = cKDTree(middle), middle - 2 * centre[:, None] * normal
     for k, (V, F, place) in enumerate(islands):
         if partner[k] >= 0:
             continue
-        for other in [k, *(j for j in range(k + 1, len(islands)) if partner[j] < 0)]:
+        # The middle of an image is the image of the middle.
+        near = np.sort(tree.query_ball_point(images[k], 1.01 * nearness(V))).tolist()
+        for other in sorted((j for j in near if j >= k and partner[j] < 0), key=lambda j: j != k):
             image = mirrored_match(V, F, islands[other][0], islands[other][1], normal, at)
             if image is None:
                 continue

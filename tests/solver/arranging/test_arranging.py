@@ -157,3 +157,26 @@ def test_a_grid_that_is_a_rectangle_stays_as_it_is(wide, tall):
         after = np.linalg.norm(found.uv[one[:, 0]] - found.uv[one[:, 1]], axis=1)
         np.testing.assert_allclose(after, before, rtol=1e-9)
     assert sorted((found.columns, found.rows)) == sorted((len(wide), len(tall)))
+
+
+@pytest.mark.parametrize("far", [0.0, 1e4])
+def test_hundreds_of_islands_find_their_images_among_those_nearby(far, monkeypatch):
+    """Every triangle of a surface that is its own mirror image: each has one partner, and few are compared."""
+    points, _, faces = grid(12, 8)
+    points = points - [0, 0, points[:, 2].min() + 0.1]
+    corners = np.concatenate([points[faces], (points * [1, 1, -1])[faces][:, ::-1]]) + [0, 0, far]
+    uv = np.random.default_rng(0).random((len(corners), 3, 2))
+    calls = []
+
+    def counted(*arguments):
+        calls.append(0)
+        return mirrored_match(*arguments)
+
+    monkeypatch.setattr("omt_uv.solver.arranging.halves.mirrored_match", counted)
+    islands = [(v, np.array([[0, 1, 2]]), place) for v, place in zip(corners, uv, strict=True)]
+    found = halves(islands, np.array([0, 0, 1.0]), far, True)
+    half = len(faces)
+    np.testing.assert_array_equal(found.partner, np.roll(np.arange(2 * half), half))
+    assert len(calls) < 2 * half
+    for k in range(half):
+        np.testing.assert_array_equal(found.uv[k], found.uv[k + half][::-1])
