@@ -87,6 +87,9 @@ def _outlined(
         raise LandmarkError("The marker of the centre lies on the boundary", REMEDY, "vertex", [centre])
     if not any(outer in loop for loop in loops):
         places, around, old = surroundings(vertices, faces, inner, outer)
+        if outer not in old:
+            cause = "The surface as far from the marker of the centre as that of the start does not reach to this"
+            raise LandmarkError(cause, REMEDY, "vertex", [start])
         inner, outer = (int(np.flatnonzero(old == k)[0]) for k in (inner, outer))
         vertices, faces, inner, outer = _part_of(places, around, inner, outer)
         loops = boundary_loops(faces)
