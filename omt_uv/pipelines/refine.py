@@ -9,6 +9,7 @@ import numpy as np
 
 from ..settings import RefineSettings
 from ..solver.editing.refine_island import refine_island
+from ..solver.editing.refine_together import GivenIsland, refine_together
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
@@ -20,6 +21,7 @@ from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
 from ..solver.parameterization.chart_indices import ChartPins, CornerPins, chart_target, located, pins_of_chart
 from ..solver.parameterization.chart_map import ChartMap
+from ..solver.parameterization.small_charts import BATCH, MANY, SMALL
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
 from ..solver.refinement.refine import Refinement
@@ -29,6 +31,9 @@ from .subdivision import refined_on_subdivision, subdivided_target
 
 # Of `Distortion`, what a report says of an island before and after.
 FIGURES = ("area_l1", "area_sd", "angle_mean", "folds")
+
+# Share of the progress of islands that are refined side by side.
+TOGETHER = 0.2
 
 
 @dataclass(frozen=True)
@@ -95,13 +100,19 @@ def refine_islands(
     total = sum(len(island.chart.triangles) for _, island, _ in found)
     refined, done = [], 0
     working = PACKING_FROM if settings.pack else 1.0
-    for owner, island, pins in found:
-        share = len(island.chart.triangles)
+    densities = []
+    for owner, island, _ in found:
         target = chart_target(targets[owner], surfaces[owner][0], island.chart)
-        density = None if target is None else target.density
-        steps = _improve(island, pins, settings, density)
+        densities.append(None if target is None else target.density)
+    together = yield from part_of(_improve_together(found, densities, settings), 0.0, working * TOGETHER)
+    for (owner, island, pins), density, ready in zip(found, densities, together, strict=True):
+        share = len(island.chart.triangles)
+        begin, part = working * (TOGETHER + (1 - TOGETHER) * done / total), working * (1 - TOGETHER) * share / total
         try:
-            fixed_scale, refinement = yield from part_of(steps, working * done / total, working * share / total)
+            if ready is None:
+                fixed_scale, refinement = yield from part_of(_improve(island, pins, settings, density), begin, part)
+            else:
+                fixed_scale, refinement = False, ready
         except MeshError as error:
             raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
         refined.append(_RefinedIsland(owner, island, pins, fixed_scale, refinement, density))
@@ -151,6 +162,31 @@ def found_islands(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]],
         except MeshError as error:
             raise Refusal(index, error) from error
     return found, warnings
+
+
+def _improve_together(
+    found: Sequence[tuple[int, Island, ChartPins | None]],
+    densities: Sequence[np.ndarray | None],
+    settings: RefineSettings,
+) -> Steps[list[Refinement | None]]:
+    """Refinements of small islands without pins if they are many; None for each that has to go alone."""
+    refined: list[Refinement | None] = [None] * len(found)
+    small = [k for k, (_, i, pins) in enumerate(found) if pins is None and len(i.chart.triangles) <= SMALL]
+    if settings.keep_boundary or len(small) < MANY:
+        return refined
+    sizes = np.cumsum([len(found[k][1].chart.triangles) for k in small])
+    batches = np.split(np.array(small), np.flatnonzero(np.diff(sizes // BATCH)) + 1)
+    for number, batch in enumerate(batches):
+        given = []
+        for k in batch.tolist():
+            island = found[k][1]
+            chart = island.chart
+            given.append(GivenIsland(chart.vertices, chart.triangles, island.uv, chart.faces, densities[k]))
+        steps = refine_together(given, balance=settings.balance, quality=settings.quality)
+        maps = yield from part_of(steps, number / len(batches), 1 / len(batches))
+        for k, refinement in zip(batch.tolist(), maps, strict=True):
+            refined[k] = refinement
+    return refined
 
 
 def _improve(

@@ -82,7 +82,7 @@ class BatchMaps:
     ----------
     uv : (n,2) coordinates of all charts, one after the other, without folds
     solved : (c,) bool of every chart; False: nothing was found
-    steps, residual, area_weight : (c,) as in `refine.Refinement`
+    steps, residual, area_weight, energy : (c,) as in `refine.Refinement`
     area_l1, area_sd, angle_mean : (c,) as `maps.distortion` measures them
     """
 
@@ -94,6 +94,7 @@ class BatchMaps:
     area_sd: np.ndarray
     angle_mean: np.ndarray
     area_weight: np.ndarray
+    energy: np.ndarray
 
 
 def refine_batch(
@@ -171,6 +172,7 @@ def _measured(union: MeshUnion, faces: Elements, w: np.ndarray, continuation: Ba
         area_sd=np.sqrt(sums(share * (ratio - 1) ** 2)),
         angle_mean=sums(share * shear),
         area_weight=continuation.area_weight,
+        energy=continuation.value,
     )
 
 
