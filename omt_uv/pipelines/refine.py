@@ -97,27 +97,14 @@ def refine_islands(
         None if modifier is None else subdivided_target(surface, modifier)
         for (surface, _, _), modifier in zip(surfaces, modifiers, strict=True)
     ]
-    total = sum(len(island.chart.triangles) for _, island, _ in found)
-    refined, done = [], 0
-    working = PACKING_FROM if settings.pack else 1.0
     densities = []
     for owner, island, _ in found:
         target = chart_target(targets[owner], surfaces[owner][0], island.chart)
         densities.append(None if target is None else target.density)
-    together = yield from part_of(_improve_together(found, densities, settings), 0.0, working * TOGETHER)
-    for (owner, island, pins), density, ready in zip(found, densities, together, strict=True):
-        share = len(island.chart.triangles)
-        begin, part = working * (TOGETHER + (1 - TOGETHER) * done / total), working * (1 - TOGETHER) * share / total
-        try:
-            if ready is None:
-                fixed_scale, refinement = yield from part_of(_improve(island, pins, settings, density), begin, part)
-            else:
-                fixed_scale, refinement = False, ready
-        except MeshError as error:
-            raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
-        refined.append(_RefinedIsland(owner, island, pins, fixed_scale, refinement, density))
-        warnings += [(owner, text) for text in (*refinement.warnings, *_unfinished(refinement))]
-        done += share
+    working = PACKING_FROM if settings.pack else 1.0
+    refined = yield from part_of(_improved(found, densities, settings), 0.0, working)
+    for r in refined:
+        warnings += [(r.owner, text) for text in (*r.refinement.warnings, *_unfinished(r.refinement))]
     refined, more = yield from _on_subdivisions(surfaces, refined, modifiers, settings)
     warnings += more
     uvs = _at_one_density(refined)
@@ -162,6 +149,31 @@ def found_islands(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]],
         except MeshError as error:
             raise Refusal(index, error) from error
     return found, warnings
+
+
+def _improved(
+    found: Sequence[tuple[int, Island, ChartPins | None]],
+    densities: Sequence[np.ndarray | None],
+    settings: RefineSettings,
+) -> Steps[list[_RefinedIsland]]:
+    """All islands, those of few triangles side by side, if they are many, and then the others; densities: of each, see
+    `_RefinedIsland`."""
+    together = yield from part_of(_improve_together(found, densities, settings), 0.0, TOGETHER)
+    total = sum(len(island.chart.triangles) for _, island, _ in found)
+    refined, done = [], 0
+    for (owner, island, pins), density, ready in zip(found, densities, together, strict=True):
+        begin, share = done / total, len(island.chart.triangles) / total
+        done += len(island.chart.triangles)
+        if ready is not None:
+            refined.append(_RefinedIsland(owner, island, pins, False, ready, density))
+            continue
+        steps = _improve(island, pins, settings, density)
+        try:
+            fixed, refinement = yield from part_of(steps, TOGETHER + (1 - TOGETHER) * begin, (1 - TOGETHER) * share)
+        except MeshError as error:
+            raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
+        refined.append(_RefinedIsland(owner, island, pins, fixed, refinement, density))
+    return refined
 
 
 def _improve_together(

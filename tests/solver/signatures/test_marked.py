@@ -106,3 +106,4 @@ def test_any_two_vertices_of_a_long_box_are_markers_or_are_refused_by_name(seed)
         except errors.LandmarkError as error:
             told.append(error)
     assert all(error.elements.tolist() for error in told) and len(told) < 20
+    assert any("does not reach" in str(error) for error in told)
