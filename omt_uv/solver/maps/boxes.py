@@ -18,36 +18,27 @@ SLANT = 0.25
 # A sweep compares so many boxes with each on average at most; where more lie one above the other, a grid is faster.
 SWEPT_PER_BOX = 40
 MOST_CELLS = 2**24
-# Boxes with more than so many others in their cells, on average, lie on one another as a whole.
-CROWDED = 200
+
+
+class CrowdedError(Exception):
+    """More boxes are near one another than there shall be pairs of."""
 
 
 def box_pairs(
-    low1: np.ndarray, high1: np.ndarray, low2: np.ndarray, high2: np.ndarray
+    low1: np.ndarray, high1: np.ndarray, low2: np.ndarray, high2: np.ndarray, most: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs i, j (p,) of boxes that meet, in their order: their corners are (k,2) each, and (l,2) each."""
+    """Pairs i, j (p,) of boxes that meet, in their order: their corners are (k,2) each, and (l,2) each.
+
+    Raises
+    ------
+    CrowdedError : more than `most` pairs would have to be looked at
+    """
     if not len(low1) or not len(low2):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    pairs = _swept(low1, high1, low2, high2)
-    if pairs is None:
-        pairs = _Cells(low1, high1, low2, high2).pairs()
-    return _meeting(pairs, low1, high1, low2, high2)
-
-
-def own_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """`box_pairs` of boxes with corners (k,2) and themselves; None where they are CROWDED, for memory."""
-    pairs = _swept(low, high, low, high) if len(low) else (np.zeros(0, np.int64),) * 2
-    if pairs is None:
-        cells = _Cells(low, high, low, high)
-        if cells.pair_count() > CROWDED * len(low):
-            return None
-        pairs = cells.pairs()
-    return _meeting(pairs, low, high, low, high)
-
-
-def _meeting(pairs, low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray]:
-    """Those of the pairs (p,) that meet, each once and in their order."""
-    i, j = pairs
+    low = np.minimum(low1.min(0), low2.min(0))
+    extents = np.maximum(high1.max(0), high2.max(0)) - low
+    pairs = _swept(low1, high1, low2, high2, int(extents.argmax()))
+    i, j = _in_grid(low1, high1, low2, high2, low, float(extents.max()), most) if pairs is None else pairs
     meet = np.ones(len(i), bool)
     # Axis by axis: millions of edges have many millions of pairs.
     for axis in range(2):
@@ -57,9 +48,8 @@ def _meeting(pairs, low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray]:
     return key // len(low2), key % len(low2)
 
 
-def _swept(low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray] | None:
-    """Pairs (p,) of boxes that meet along a sweep mostly along the longer axis, or None where these are too many."""
-    axis = int((np.maximum(high1.max(0), high2.max(0)) - np.minimum(low1.min(0), low2.min(0))).argmax())
+def _swept(low1, high1, low2, high2, axis: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Pairs (p,) of boxes that meet along a sweep mostly along an axis, or None where these are too many."""
     begin1, end1, begin2, end2 = (x[:, axis] + SLANT * x[:, 1 - axis] for x in (low1, high1, low2, high2))
     order1, order2 = np.argsort(begin1), np.argsort(begin2)
     sorted1, sorted2 = begin1[order1], begin2[order2]
@@ -80,31 +70,22 @@ def _swept(low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray] | None:
     return i, j
 
 
-class _Cells:
-    """Boxes by the cells of a uniform grid that they touch."""
-
-    def __init__(self, low1, high1, low2, high2):
-        low = np.minimum(low1.min(0), low2.min(0))
-        extent = float((np.maximum(high1.max(0), high2.max(0)) - low).max())
-        span = np.concatenate([high1 - low1, high2 - low2]).max(axis=1)
-        # As the boxes are, however little of the plane they fill: those of a strip lie on a line.
-        size = max(float(np.median(span)), extent / MOST_CELLS, 1e-300)
-        while (np.floor(span / size) + 2).astype(float) @ (np.floor(span / size) + 2) > CELLS_PER_BOX * len(span):
-            size *= 2
-        self.box1, cell1 = _rasterise(low1 - low, high1 - low, size)
-        box2, cell2 = _rasterise(low2 - low, high2 - low, size)
-        order = np.argsort(cell2, kind="stable")
-        self.box2, cell2 = box2[order], cell2[order]
-        self.begin, self.end = np.searchsorted(cell2, cell1), np.searchsorted(cell2, cell1, side="right")
-
-    def pair_count(self) -> int:
-        """Of those in one cell, which may be so in several."""
-        return int((self.end - self.begin).sum())
-
-    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Boxes (p,) that touch the same cell, some of them several times."""
-        which, place = expand(self.end - self.begin)
-        return self.box1[which], self.box2[self.begin[which] + place]
+def _in_grid(low1, high1, low2, high2, low, extent: float, most: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (p,) of boxes that touch the same cell of a uniform grid, some of them several times."""
+    span = np.concatenate([high1 - low1, high2 - low2]).max(axis=1)
+    # As the boxes are, however little of the plane they fill: those of a strip lie on a line.
+    size = max(float(np.median(span)), extent / MOST_CELLS, 1e-300)
+    while (np.floor(span / size) + 2).astype(float) @ (np.floor(span / size) + 2) > CELLS_PER_BOX * len(span):
+        size *= 2
+    box1, cell1 = _rasterise(low1 - low, high1 - low, size)
+    box2, cell2 = _rasterise(low2 - low, high2 - low, size)
+    order = np.argsort(cell2, kind="stable")
+    box2, cell2 = box2[order], cell2[order]
+    begin, end = np.searchsorted(cell2, cell1), np.searchsorted(cell2, cell1, side="right")
+    if (end - begin).sum() > most:
+        raise CrowdedError
+    which, place = expand(end - begin)
+    return box1[which], box2[begin[which] + place]
 
 
 def _rasterise(low, high, size):

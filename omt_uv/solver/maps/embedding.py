@@ -12,10 +12,11 @@ import numpy as np
 
 from ..mesh.geometry import cross2
 from ..mesh.topology import expand, graph_components
-from .boxes import box_pairs, own_pairs
+from .boxes import CrowdedError, box_pairs
 from .overlap import overlap_share
 
 WELD = 1e-7  # corners of one vertex closer than this, relative to the UV extent, are one UV vertex
+CROWDED = 200  # edges near each edge of the boundary, on average: with more a map lies on itself as a whole
 MOST_WINDINGS = 20_000_000  # edges compared with points, for time; with more a map counts as not known to be one to one
 
 
@@ -140,10 +141,11 @@ def _angles(uv):
 
 def _touch(tail, head, begin, end) -> bool:
     """Whether two edges (b,2) to (b,2) of a boundary have a point in common that is no vertex of both, or may have."""
-    found = own_pairs(np.minimum(begin, end), np.maximum(begin, end))
-    if found is None:
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    try:
+        i, j = box_pairs(low, high, low, high, CROWDED * len(low))
+    except CrowdedError:
         return True
-    i, j = found
     apart = (i < j) & (tail[i] != head[j]) & (head[i] != tail[j])
     i, j = i[apart], j[apart]
     beside = cross2(end[i] - begin[i], begin[j] - begin[i]) * cross2(end[i] - begin[i], end[j] - begin[i]) <= 0

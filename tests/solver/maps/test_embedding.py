@@ -146,15 +146,15 @@ def test_thousands_of_triangles_over_one_another_take_little_memory():
     assert most < 200e6
 
 
-@pytest.mark.parametrize("size", [0.001, 0.01])
-def test_boxes_that_are_not_crowded_meet_as_any_do(size, monkeypatch):
+@pytest.mark.parametrize("swept", [boxes.SWEPT_PER_BOX, 0])
+def test_boxes_that_are_not_crowded_meet_as_any_do(swept, monkeypatch):
+    monkeypatch.setattr(boxes, "SWEPT_PER_BOX", swept)
     rng = np.random.default_rng(1)
     low = rng.random((1000, 2))
-    high = low + size * rng.random((1000, 2))
-    for swept in (boxes.SWEPT_PER_BOX, 0):
-        monkeypatch.setattr(boxes, "SWEPT_PER_BOX", swept)
-        for one, other in zip(boxes.own_pairs(low, high), boxes.box_pairs(low, high, low, high), strict=True):
-            np.testing.assert_array_equal(one, other)
-    monkeypatch.setattr(boxes, "CROWDED", 1)
-    assert boxes.own_pairs(low, high) is None
-    assert boxes.own_pairs(low[:0], high[:0])[0].size == 0
+    high = low + 0.02 * rng.random((1000, 2))
+    found = boxes.box_pairs(low, high, low, high)
+    for one, other in zip(found, boxes.box_pairs(low, high, low, high, 200 * 1000), strict=True):
+        np.testing.assert_array_equal(one, other)
+    high = low + 1
+    with pytest.raises(boxes.CrowdedError):
+        boxes.box_pairs(low, high, low, high, 200 * 1000)
