@@ -53,9 +53,12 @@ def untangle(
 
 
 def map_energy(uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray) -> float:
-    """Mean of shear and area error of a map (n,2), scaled to the area of the surface; infinite if it folds."""
-    area = face_areas(positions, triangles)
-    scale = np.sqrt(area.sum() / np.abs(signed_areas(uv, triangles)).sum())
+    """Mean of shear and area error of a map (n,2), scaled to the area of the surface; infinite if it folds, or has no
+    area."""
+    area, covered = face_areas(positions, triangles), np.abs(signed_areas(uv, triangles)).sum()
+    if covered == 0:
+        return np.inf
+    scale = np.sqrt(area.sum() / covered)
     return energy(elements(positions, triangles, area), scale * (uv[:, 0] + 1j * uv[:, 1]), 1.0)
 
 

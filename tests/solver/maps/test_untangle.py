@@ -50,6 +50,13 @@ def test_energy_of_a_map_knows_no_scale():
     assert map_energy(V[:, :2], flat, F) == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("squeeze", [[0, 0], [1, 0]])
+def test_a_map_without_area_has_no_finite_energy(squeeze):
+    V, F = meshes.bumpy(4, 4)
+    assert map_energy(V[:, :2] * squeeze, V, F) == np.inf > map_energy(V[:, :2], V, F)
+
+
 def test_a_boundary_on_the_circle():
     V, F, loop, _ = disk()
     found = circle_boundary(V[:, :2], loop, 2.0)
