@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, insort
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -44,18 +45,19 @@ def stacks(islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], mirrore
     ([0, 0], True)
     """
     areas = np.array([face_areas(V, F).sum() for V, F, _ in islands])
-    most = float(areas.max(initial=0.0))
+    slack = float(areas.max(initial=0.0)) * 10.0**-DIGITS
     uv, stack = [np.array(place, float) for *_, place in islands], np.arange(len(islands))
-    firsts: list[int] = []
+    # The first one of each shape by its sizes, and in the order of areas: thousands of others need no look.
+    firsts: dict[tuple[int, int], list[tuple[float, int]]] = {}
     for k, (V, F, _) in enumerate(islands):
-        for first in firsts:
+        alike = firsts.setdefault((len(V), len(F)), [])
+        begin, end = bisect_left(alike, (areas[k] - slack, -1)), bisect_left(alike, (areas[k] + slack, len(islands)))
+        for first in sorted(island for _, island in alike[begin:end]):
             W, G, _ = islands[first]
-            if len(W) != len(V) or len(G) != len(F) or abs(areas[first] - areas[k]) > most * 10.0**-DIGITS:
-                continue
             found = matching(V, F, W, G)
             if found is not None and (mirrored or not found.mirrored):
                 uv[k], stack[k] = uv[first][found.vertices], first
                 break
         else:
-            firsts.append(k)
+            insort(alike, (float(areas[k]), k))
     return Stacks(uv, stack)

@@ -180,3 +180,22 @@ def test_hundreds_of_islands_find_their_images_among_those_nearby(far, monkeypat
     assert len(calls) < 2 * half
     for k in range(half):
         np.testing.assert_array_equal(found.uv[k], found.uv[k + half][::-1])
+
+
+def test_hundreds_of_islands_are_compared_with_those_of_their_area(monkeypatch):
+    """Triangles that all differ, and a turned copy of each: it lies on that one, and hardly any other is looked at."""
+    rng = np.random.default_rng(3)
+    corners = rng.normal(size=(300, 3, 3))
+    calls = []
+
+    def counted(*arguments):
+        calls.append(0)
+        return matching(*arguments)
+
+    monkeypatch.setattr("omt_uv.solver.arranging.stacks.matching", counted)
+    islands = [(v, np.array([[0, 1, 2]]), rng.random((3, 2))) for v in [*corners, *(corners @ turn(5).T + 3)]]
+    found = stacks(islands)
+    np.testing.assert_array_equal(found.stack, np.tile(np.arange(300), 2))
+    assert found.moved == 300 <= len(calls) < 900
+    for k in range(300):
+        np.testing.assert_array_equal(found.uv[k + 300], found.uv[k])
