@@ -201,7 +201,7 @@ def test_outlines_that_come_to_cross_get_one_barrier_each(monkeypatch):
 
 def test_an_island_is_the_image_of_one_at_most(monkeypatch):
     """Two islands lie on each other on one side, and one on the other."""
-    places = [np.array([[x, 0.0, 0], [x + 1, 0, 0], [x, 1, 0]]) for x in (1, 1, -2)]
+    places = [np.array([[1.0, 0, 0], [2, 0, 0], [1, 1, 0]]) * [side, 1, 1] for side in (1, 1, -1)]
     faces = np.array([[0, 1, 2]])
     sides = [np.sign(V[0, 0]) for V in places]
     monkeypatch.setattr(

@@ -20,25 +20,29 @@ SWEPT_PER_BOX = 40
 MOST_CELLS = 2**24
 
 
-class CrowdedError(Exception):
-    """More boxes are near one another than there shall be pairs of."""
-
-
 def box_pairs(
-    low1: np.ndarray, high1: np.ndarray, low2: np.ndarray, high2: np.ndarray, most: float = np.inf
+    low1: np.ndarray, high1: np.ndarray, low2: np.ndarray, high2: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs i, j (p,) of boxes that meet, in their order: their corners are (k,2) each, and (l,2) each.
+    """Pairs i, j (p,) of boxes that meet, in their order: their corners are (k,2) each, and (l,2) each."""
+    found = pairs_up_to(np.inf, low1, high1, low2, high2)
+    assert found is not None
+    return found
 
-    Raises
-    ------
-    CrowdedError : more than `most` pairs would have to be looked at
-    """
+
+def pairs_up_to(
+    most: float, low1: np.ndarray, high1: np.ndarray, low2: np.ndarray, high2: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """`box_pairs`, or None where more than `most` pairs would have to be looked at."""
     if not len(low1) or not len(low2):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low = np.minimum(low1.min(0), low2.min(0))
     extents = np.maximum(high1.max(0), high2.max(0)) - low
     pairs = _swept(low1, high1, low2, high2, int(extents.argmax()))
-    i, j = _in_grid(low1, high1, low2, high2, low, float(extents.max()), most) if pairs is None else pairs
+    if pairs is None:
+        pairs = _in_grid(low1, high1, low2, high2, low, float(extents.max()), most)
+    if pairs is None:
+        return None
+    i, j = pairs
     meet = np.ones(len(i), bool)
     # Axis by axis: millions of edges have many millions of pairs.
     for axis in range(2):
@@ -70,8 +74,11 @@ def _swept(low1, high1, low2, high2, axis: int) -> tuple[np.ndarray, np.ndarray]
     return i, j
 
 
-def _in_grid(low1, high1, low2, high2, low, extent: float, most: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (p,) of boxes that touch the same cell of a uniform grid, some of them several times."""
+def _in_grid(
+    low1, high1, low2, high2, low, extent: float, most: float = np.inf
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Pairs (p,) of boxes that touch the same cell of a uniform grid, some of them several times; None where these are
+    more than `most`."""
     span = np.concatenate([high1 - low1, high2 - low2]).max(axis=1)
     # As the boxes are, however little of the plane they fill: those of a strip lie on a line.
     size = max(float(np.median(span)), extent / MOST_CELLS, 1e-300)
@@ -83,7 +90,7 @@ def _in_grid(low1, high1, low2, high2, low, extent: float, most: float = np.inf)
     box2, cell2 = box2[order], cell2[order]
     begin, end = np.searchsorted(cell2, cell1), np.searchsorted(cell2, cell1, side="right")
     if (end - begin).sum() > most:
-        raise CrowdedError
+        return None
     which, place = expand(end - begin)
     return box1[which], box2[begin[which] + place]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..mesh.geometry import cross2
 from ..mesh.topology import expand, graph_components
-from .boxes import CrowdedError, box_pairs
+from .boxes import box_pairs, pairs_up_to
 from .overlap import overlap_share
 
 WELD = 1e-7  # corners of one vertex closer than this, relative to the UV extent, are one UV vertex
@@ -142,10 +142,10 @@ def _angles(uv):
 def _touch(tail, head, begin, end) -> bool:
     """Whether two edges (b,2) to (b,2) of a boundary have a point in common that is no vertex of both, or may have."""
     low, high = np.minimum(begin, end), np.maximum(begin, end)
-    try:
-        i, j = box_pairs(low, high, low, high, CROWDED * len(low))
-    except CrowdedError:
+    near = pairs_up_to(CROWDED * len(low), low, high, low, high)
+    if near is None:
         return True
+    i, j = near
     apart = (i < j) & (tail[i] != head[j]) & (head[i] != tail[j])
     i, j = i[apart], j[apart]
     beside = cross2(end[i] - begin[i], begin[j] - begin[i]) * cross2(end[i] - begin[i], end[j] - begin[i]) <= 0

@@ -197,7 +197,9 @@ def test_a_grid_lists_what_touches_its_cells():
             if min(sides) > 0 or max(sides) < 0:
                 expected[i, k] += 1
     assert Counter(zip(*(x.tolist() for x in grid.inside(points)), strict=True)) == expected and len(expected) > 20
-    np.testing.assert_array_equal(grid.cover(points), [sum(i == k for k, _ in expected) for i in range(200)])
+    np.testing.assert_array_equal(
+        grid.covered_twice(points), [sum(i == k for k, _ in expected) > 1 for i in range(200)]
+    )
     cells = np.minimum(((points - low) / grid.extent * side).astype(int).clip(0), side - 1)
     np.testing.assert_array_equal(grid.candidates(points), [len(lists[c * side + r]) for c, r in cells])
     # In parts, too, with their numbers.
