@@ -139,8 +139,11 @@ class SymmetryPlane:
             image[used] = self.image[used]
             far[used] = np.linalg.norm(self.reflected(positions[used]) - positions[image[used]], axis=1)
         else:
-            far[used], found = cKDTree(positions[used]).query(self.reflected(positions[used]))
-            image[used] = used[found]
+            # Squares of distances in a unit that is far too small or large are no numbers.
+            places, exponent = below_one(positions[used])
+            seen = np.ldexp(self.reflected(positions[used]), -exponent)
+            distance, found = cKDTree(places).query(seen)
+            image[used], far[used] = used[found], np.ldexp(distance, exponent)
         return image, far
 
     def images(self, positions: np.ndarray, triangles: np.ndarray) -> MirrorImages:

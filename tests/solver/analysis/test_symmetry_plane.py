@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.symmetry_plane import NEAR, SAMPLES, MirrorImages, _cells, symmetry_plane
+from omt_uv.solver.analysis.symmetry_plane import NEAR, SAMPLES, MirrorImages, SymmetryPlane, _cells, symmetry_plane
 
 TURNS = [np.eye(3), *Rotation.random(1, random_state=1).as_matrix()]
 
@@ -151,3 +151,14 @@ def test_what_has_no_image_is_nobody_s_and_not_in_the_plane():
     images = MirrorImages.of(np.array([1, 0, 2, -1, -1]))
     assert images.exact.tolist() == [1, 0, 2, -1, -1] and images.nearest.tolist() == [1, 0, 2, 3, 4]
     assert images.in_plane.tolist() == [False, False, True, False, False] and images.are_exact
+
+
+@pytest.mark.parametrize("unit", [1e-200, 1.0, 1e200])
+def test_images_are_found_in_any_unit(unit):
+    """Squares of such lengths are 0 or infinite."""
+    V, F = meshes.icosphere(1)
+    V = V * unit
+    plane = SymmetryPlane(np.eye(3)[0], 0.0, 0.0, None)
+    image, far = plane.nearest_images(V, F)
+    np.testing.assert_allclose(V[image], V * [-1, 1, 1], atol=1e-12 * unit)
+    assert (far <= 1e-12 * unit).all()
