@@ -31,15 +31,20 @@ SHAPES = {
 }
 
 
+def outward_hull(P):
+    """Triangles (m,3) of the convex hull of points (n,3), all of which look outside."""
+    F = ConvexHull(P).simplices.astype(np.int64)
+    inward = signed_volumes(P, F) < 0
+    F[inward] = F[inward][:, [0, 2, 1]]
+    return F
+
+
 def random_sphere(count=500, seed=0, towards=(0.0, 0, 0)):
     """Random points of the unit sphere, denser in one direction, and their hull."""
     P = np.random.default_rng(seed).normal(size=(count, 3))
     P = P / np.linalg.norm(P, axis=1, keepdims=True) + towards
     P /= np.linalg.norm(P, axis=1, keepdims=True)
-    F = ConvexHull(P).simplices.astype(np.int64)
-    inward = signed_volumes(P, F) < 0
-    F[inward] = F[inward][:, [0, 2, 1]]
-    return P, F
+    return P, outward_hull(P)
 
 
 def random_rotation(seed=0):

@@ -7,7 +7,6 @@ import meshes
 import numpy as np
 import pytest
 import sphere_shapes
-from scipy.spatial import ConvexHull
 
 from omt_uv.solver import errors
 from omt_uv.solver.progress import drain
@@ -96,9 +95,7 @@ def test_any_two_vertices_of_a_long_box_are_markers_or_are_refused_by_name(seed)
     """Of large triangles, ways lead to vertices that no part of the surface around the centre reaches."""
     corners = np.array(np.meshgrid([0.0, 1], [0, 1], [0, 30])).reshape(3, -1).T
     V = corners + np.random.default_rng(seed).normal(0, 0.02, (8, 3))
-    F = ConvexHull(V).simplices
-    out = np.einsum("ij,ij->i", np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), V[F[:, 0]] - V.mean(0))
-    F = np.where(out[:, None] > 0, F, F[:, ::-1])
+    F = sphere_shapes.outward_hull(V - V.mean(axis=0))
     told = []
     for centre, start in itertools.permutations(range(8), 2):
         try:
