@@ -135,15 +135,16 @@ class SymmetryPlane:
         """
         image, far = np.arange(len(positions)), np.full(len(positions), np.inf)
         used = np.unique(triangles)
+        # Squares of distances in a unit that is far too small or large are no numbers.
+        places, exponent = below_one(positions[used])
+        seen = np.ldexp(self.reflected(positions[used]), -exponent)
         if self.image is not None:
             image[used] = self.image[used]
-            far[used] = np.linalg.norm(self.reflected(positions[used]) - positions[image[used]], axis=1)
+            distance = np.linalg.norm(seen - np.ldexp(positions[image[used]], -exponent), axis=1)
         else:
-            # Squares of distances in a unit that is far too small or large are no numbers.
-            places, exponent = below_one(positions[used])
-            seen = np.ldexp(self.reflected(positions[used]), -exponent)
             distance, found = cKDTree(places).query(seen)
-            image[used], far[used] = used[found], np.ldexp(distance, exponent)
+            image[used] = used[found]
+        far[used] = np.ldexp(distance, exponent)
         return image, far
 
     def images(self, positions: np.ndarray, triangles: np.ndarray) -> MirrorImages:

@@ -1,5 +1,7 @@
 """Mirror planes: found wherever the body lies and however it is turned, exact or nearly; none where there is none."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -162,3 +164,5 @@ def test_images_are_found_in_any_unit(unit):
     image, far = plane.nearest_images(V, F)
     np.testing.assert_allclose(V[image], V * [-1, 1, 1], atol=1e-12 * unit)
     assert (far <= 1e-12 * unit).all()
+    known, far = replace(plane, image=image).nearest_images(V, F)
+    assert (known == image).all() and (far <= 1e-12 * unit).all()
