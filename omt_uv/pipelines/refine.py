@@ -21,7 +21,7 @@ from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
 from ..solver.parameterization.chart_indices import ChartPins, CornerPins, chart_target, located, pins_of_chart
 from ..solver.parameterization.chart_map import ChartMap
-from ..solver.parameterization.small_charts import BATCH, MANY, SMALL
+from ..solver.parameterization.small_charts import batches, is_small
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
 from ..solver.refinement.refine import Refinement
@@ -183,20 +183,20 @@ def _improve_together(
 ) -> Steps[list[Refinement | None]]:
     """Refinements of small islands without pins if they are many; None for each that has to go alone."""
     refined: list[Refinement | None] = [None] * len(found)
-    small = [k for k, (_, i, pins) in enumerate(found) if pins is None and len(i.chart.triangles) <= SMALL]
-    if settings.keep_boundary or len(small) < MANY:
+    if settings.keep_boundary:
         return refined
-    sizes = np.cumsum([len(found[k][1].chart.triangles) for k in small])
-    batches = np.split(np.array(small), np.flatnonzero(np.diff(sizes // BATCH)) + 1)
-    for number, batch in enumerate(batches):
-        given = []
-        for k in batch.tolist():
-            island = found[k][1]
-            chart = island.chart
-            given.append(GivenIsland(chart.vertices, chart.triangles, island.uv, chart.faces, densities[k]))
+    small = [k for k, (_, island, pins) in enumerate(found) if pins is None and is_small(island.chart)]
+    several = batches([len(found[k][1].chart.triangles) for k in small])
+    for number, batch in enumerate(several):
+        chosen = [small[k] for k in batch]
+        charts = [found[k][1].chart for k in chosen]
+        given = [
+            GivenIsland(chart.vertices, chart.triangles, found[k][1].uv, chart.faces, densities[k])
+            for k, chart in zip(chosen, charts, strict=True)
+        ]
         steps = refine_together(given, balance=settings.balance, quality=settings.quality)
-        maps = yield from part_of(steps, number / len(batches), 1 / len(batches))
-        for k, refinement in zip(batch.tolist(), maps, strict=True):
+        maps = yield from part_of(steps, number / len(several), 1 / len(several))
+        for k, refinement in zip(chosen, maps, strict=True):
             refined[k] = refinement
     return refined
 

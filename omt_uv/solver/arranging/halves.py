@@ -49,8 +49,8 @@ def halves(
         if partner[k] >= 0:
             continue
         # The middle of an image is the image of the middle.
-        near = np.sort(tree.query_ball_point(images[k], 1.01 * nearness(V))).tolist()
-        for other in sorted((j for j in near if j >= k and partner[j] < 0), key=lambda j: j != k):
+        near = tree.query_ball_point(images[k], 1.01 * nearness(V))
+        for other in sorted(j for j in near if j >= k and partner[j] < 0):
             image = mirrored_match(V, F, islands[other][0], islands[other][1], normal, at)
             if image is None:
                 continue

@@ -210,20 +210,24 @@ class _Grid:
 
     def covered_twice(self, points):
         """Whether each point (k,2) lies in more than one triangle; asks no further of what has been found in two."""
-        listed, number = self.candidates(points), np.zeros(len(points), np.int64)
-        left, begin, end = np.arange(len(points)), 0, ASKED_FIRST
+        cell, number = self._cell(points), np.zeros(len(points), np.int64)
+        first, last = self.start[cell], self.start[cell + 1]
+        left, many = np.arange(len(points)), ASKED_FIRST
         while len(left):
-            number[left] += np.bincount(self.inside(points[left], begin, end)[0], minlength=len(left))
-            begin, end = end, 4 * end
-            left = left[(number[left] < 2) & (listed[left] > begin)]
+            end = np.minimum(first[left] + many, last[left])
+            number[left] += np.bincount(self._among(points[left], first[left], end)[0], minlength=len(left))
+            first[left] = end
+            left, many = left[(number[left] < 2) & (end < last[left])], 3 * many
         return number > 1
 
-    def inside(self, points, begin=0, end=None):
-        """Points (c,) of these (k,2) and the triangle (c,) that each lies in, a pair for every time; of some alone that
-        a cell lists."""
+    def inside(self, points):
+        """Points (c,) of these (k,2) and the triangle (c,) that each lies in, a pair for every time."""
         cell = self._cell(points)
-        first, last = self.start[cell] + begin, self.start[cell + 1]
-        query, k = expand((last if end is None else np.minimum(last, first + end - begin)) - first)
+        return self._among(points, self.start[cell], self.start[cell + 1])
+
+    def _among(self, points, first, end):
+        """The same among the entries of cells from first (k,) to end (k,)."""
+        query, k = expand(end - first)
         triangle = self.owner[first[query] + k]
         limit = INSIDE * self.extent**2
         for i in range(3):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,13 @@ def is_small(chart: Chart) -> bool:
     return len(chart.triangles) <= SMALL and not len(chart.patches)
 
 
+def batches(sizes: Sequence[int]) -> list[np.ndarray]:
+    """Numbers (b,) of charts that are solved together, of all with so many triangles (c,) each; none of a few."""
+    if len(sizes) < MANY:
+        return []
+    return np.split(np.arange(len(sizes)), np.flatnonzero(np.diff(np.cumsum(sizes) // BATCH)) + 1)
+
+
 def map_together(
     charts: list[Chart], targets: list[Target | None], options: MapOptions
 ) -> Steps[list[ChartMap | None]]:
@@ -40,13 +48,12 @@ def map_together(
     targets : of each chart, see `chart_indices.chart_target`
     """
     found: list[ChartMap | None] = [None] * len(charts)
-    if len(charts) < MANY:
-        return found
-    sizes = np.cumsum([len(c.triangles) for c in charts])
-    for batch in np.split(np.arange(len(charts)), np.flatnonzero(np.diff(sizes // BATCH)) + 1):
-        done = float(sizes[batch[0]] / sizes[-1])
+    sizes = [len(c.triangles) for c in charts]
+    end = np.cumsum(sizes)
+    for batch in batches(sizes):
+        done = float(end[batch[0]] / end[-1])
         steps = _map_batch([charts[k] for k in batch], [targets[k] for k in batch], options)
-        maps = yield from part_of(steps, done, float(sizes[batch[-1]] / sizes[-1]) - done)
+        maps = yield from part_of(steps, done, float(end[batch[-1]] / end[-1]) - done)
         for k, chart_map in zip(batch, maps, strict=True):
             found[k] = chart_map
     return found

@@ -104,13 +104,13 @@ def test_few_and_many_islands_of_a_surface_are_refined_alike(count, monkeypatch)
     whole, pins = surface(count)
     done = drain(refine_islands([(whole, None, pins)], RefineSettings()))
     assert calls == ([12] if count == 12 else [])
-    monkeypatch.setattr("omt_uv.pipelines.refine.MANY", 99)
+    monkeypatch.setattr("omt_uv.solver.parameterization.small_charts.MANY", 99)
     alone = drain(refine_islands([(whole, None, pins)], RefineSettings()))
     np.testing.assert_allclose(done.uv[0], alone.uv[0], atol=0.02)
     assert [r["status"] for r in done.reports[0]] == ["converged"] * count
     for report in done.reports[0]:
         assert report["area_l1"] < 5e-3 < report["before"]["area_l1"] and report["folds"] == 0
-    monkeypatch.setattr("omt_uv.pipelines.refine.MANY", 1)
+    monkeypatch.setattr("omt_uv.solver.parameterization.small_charts.MANY", 1)
     calls.clear()
     drain(refine_islands([(whole, None, pins)], RefineSettings(keep_boundary=True)))
     assert calls == []
@@ -119,6 +119,6 @@ def test_few_and_many_islands_of_a_surface_are_refined_alike(count, monkeypatch)
 def test_batches_of_any_size_give_the_same(monkeypatch):
     whole, pins = surface(12)
     done = drain(refine_islands([(whole, None, pins)], RefineSettings()))
-    monkeypatch.setattr("omt_uv.pipelines.refine.BATCH", 60)
+    monkeypatch.setattr("omt_uv.solver.parameterization.small_charts.BATCH", 60)
     parted = drain(refine_islands([(whole, None, pins)], RefineSettings()))
     np.testing.assert_allclose(done.uv[0], parted.uv[0], atol=1e-3)
