@@ -10,8 +10,8 @@ from .shells import level_surface
 from .tet_mesh import tet_volumes
 from .transfer import TetLocation
 
-# Shares of volumes in a map below this, over the mean, are taken for it, and those in a body that are not positive:
-# flat and inverted tetrahedra have no logarithm.
+# Shares of volumes in a map below this, over the mean, are taken for it, or for those in the body where these are less,
+# and those in a body that are not positive: flat and inverted tetrahedra have no logarithm.
 LEAST = 1e-3
 
 
@@ -28,7 +28,8 @@ def dilation(points: np.ndarray, positions: np.ndarray, tets: np.ndarray) -> np.
     """Binary logarithm (m,) of the ratio of shares, there over here, of tetrahedra (m,4): 0 where a volume is right."""
     here, there = (x / x.sum() for x in (tet_volumes(points, tets), tet_volumes(positions, tets)))
     least = LEAST / len(tets)
-    return np.log2(np.maximum(there, least) / np.where(here > 0, here, least))
+    here = np.where(here > 0, here, least)
+    return np.log2(np.maximum(there, np.minimum(here, least)) / here)
 
 
 def plane_slice(

@@ -48,3 +48,16 @@ def test_trees_are_as_short_as_those_of_another_program():
     between = np.linalg.norm(points[:, :, None] - points[:, None], axis=3)
     expected = [minimum_spanning_tree(one).sum() for one in between]
     np.testing.assert_allclose(_tree_costs(between), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-2, 1e3, 1e9])
+@pytest.mark.parametrize("flat", [1.0, 0.2])
+def test_where_branches_meet_hangs_on_no_unit_of_length(unit, flat):
+    """Three ends meet where that saves a tenth, in whatever unit, and in none where it does not."""
+    points = np.random.default_rng(0).random((300, 2)) + [2, 0]
+    angle = 2 * np.pi * np.arange(3) / 3
+    points[:3], points[3] = np.column_stack([np.sin(angle), flat * np.cos(angle)]), 0
+    distance = distances(points, range(3))
+    plain = meeting_points(distance, distance[:, :3])
+    assert plain.tolist() == ([] if flat < 0.5 else [3])
+    np.testing.assert_array_equal(meeting_points(unit * distance, unit * distance[:, :3]), plain)

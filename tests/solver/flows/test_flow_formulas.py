@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bodies import icosphere
+from scipy import special
 from scipy.spatial import cKDTree
 
 from omt_uv.solver.errors import HandleError, NonFiniteError
@@ -280,3 +281,30 @@ def test_the_rotation_between_points_is_the_one_that_turned_them():
         R[0] *= np.linalg.det(R)
         points = rng.normal(size=(6, d))
         np.testing.assert_allclose(rotation_between(points, 2 * points @ R.T + 7), R, atol=1e-12)
+
+
+class Gust:
+    """A steady stream along x that blows across where it is at `place`."""
+
+    def __init__(self, place, width):
+        self.place, self.width = place, width
+
+    def __call__(self, points):
+        across = np.exp(-(((points[:, 0] - self.place) / self.width) ** 2))
+        return np.stack([np.ones(len(points)), across, 0 * across], axis=1)
+
+
+@pytest.mark.parametrize("place", [0.4, 3.0, 7.5])
+@pytest.mark.parametrize("width", [0.2, 1.0])
+def test_steps_are_as_exact_wherever_the_probes_come_by_on_their_way(place, width):
+    """What is farther on is met where the probes are then, and not where they were: steps are planned along the way,
+    and those of one stretch are those from where the stretch before has brought them."""
+    start, knots, tolerance = np.array([[0.0, 0, 0], [0.3, 1, 0]]), np.array([0.0, 2.0, 5.0, 8.0]), 1e-5
+    plan = integration.planned_steps(lambda j, t: Gust(place, width), knots, start, tolerance)
+    points = start
+    for time, steps in zip(knots[1:], plan, strict=True):
+        points = integration.carried(points, steps)
+        assert points[:, 0] == pytest.approx(start[:, 0] + time)
+    whole = [special.erf((x - place) / width) for x in (start[:, 0], start[:, 0] + 8)]
+    across = start[:, 1] + width * np.sqrt(np.pi) / 2 * (whole[1] - whole[0])
+    assert np.abs(points[:, 1] - across).max() < 3 * 8 * tolerance

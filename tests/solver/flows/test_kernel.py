@@ -57,3 +57,17 @@ def test_contradictions_are_refused():
     given = conditions(points, np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(HandleError, match="too close"):
         interpolated_field(given, np.array([1.0, 0, 0, -1, 0, 0]), 4.0)
+
+
+@pytest.mark.parametrize("speed", [1e-12, 1e-6, 1e6, 1e12])
+@pytest.mark.parametrize("near", [0.0, 0.1])
+def test_fields_are_linear_in_what_is_asked_whatever_the_unit_of_speed(speed, near):
+    """What cannot be is refused however slow it is, and what can be is found however fast."""
+    given, values, _ = random_field(3)
+    plain, fast = (interpolated_field(given, each, 4.0, near) for each in (values, speed * values))
+    points = np.random.default_rng(3).uniform(-1, 1, (50, 3))
+    np.testing.assert_allclose(fast(points) / speed, plain(points), atol=1e-6 * np.abs(plain(points)).max())
+    # Nearly as exact as that of the unit itself, in the worst of the directions.
+    twice = conditions(np.array([[0.0, 0, 0], [1e-9, 0, 0]]), np.zeros((0, 3)), np.zeros((0, 3)))
+    with pytest.raises(HandleError, match="too close"):
+        interpolated_field(twice, speed * np.array([1.0, 0, 0, -1, 0, 0]), 4.0, near)

@@ -80,3 +80,18 @@ def test_a_step_that_led_nowhere_changes_nothing():
     # Nor does one along which the gradient falls: the Hessian would not be positive.
     descent.direction(x + 1, gradient(x) - 1, diagonal)
     assert not descent.pairs
+
+
+def test_whoever_asks_may_write_to_what_was_handed_in():
+    """Steps are differences of what was there then: arrays that are used again say the same as new ones."""
+    x0, gradient = quadratic(4)
+    kept, fresh, diagonal = LBFGS(), LBFGS(), np.full((4, 1), 0.02)
+    x, g = np.zeros_like(x0), np.empty_like(x0)
+    for _ in range(6):
+        g[:] = gradient(x)
+        expected = fresh.direction(x.copy(), g.copy(), diagonal.copy())
+        step = kept.direction(x, g, diagonal)
+        np.testing.assert_array_equal(step, expected)
+        x += 0.5 * step
+        step[:] = np.nan
+    assert len(kept.pairs) == len(fresh.pairs) == 5 and (diagonal == 0.02).all()

@@ -90,3 +90,31 @@ def test_sides_between_cells_that_tell_no_difference_conduct_nothing():
     i, j, found = cells._against(pairs, np.zeros(3), side, np.array([2.0, 0.0, 6.0, 12.0]), np.arange(3))
     assert (i.tolist(), j.tolist()) == ([0, 1, 0, 2], [1, 0, 2, 1])
     assert found == pytest.approx([0, 0, 6 / (2 * 3), 12 / (2 * 3)])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("parts", [1, 2, 3])
+def test_the_direction_mends_the_areas_of_every_part_and_keeps_one_weight_of_each(parts, seed):
+    """Areas of cells change by the Laplacian of the direction: that is what they lack, on each part by itself."""
+    V, F, *_ = flat(5, 1)
+    m, rng = len(F), np.random.default_rng(seed)
+    V, F = np.concatenate([V + [2 * k, 0, 0] for k in range(parts)]), np.concatenate([F + k * len(V) for k in range(parts)])
+    n = 7 * parts
+    sites = Sites(np.repeat(m * np.arange(parts), 7) + rng.integers(m, size=n), inner(rng.dirichlet(np.ones(3), n)))
+    # In no order of their parts.
+    order = rng.permutation(n)
+    sites = Sites(sites.triangle[order], sites.barycentric[order])
+    mesh, radius, part = WindowMesh(V, F), np.full(n, 5.0), np.repeat(np.arange(parts), m)
+    asked = np.full(n, 1 / 7)
+    problem = DivisionProblem(mesh, face_areas(V, F), part, asked)
+    dual = GeodesicDual(problem, sites, polar_coordinates(mesh, sites, radius, np.arange(n)), radius)
+    found = dual.cells(np.zeros(n))
+    direction = dual.direction(found, asked)
+    (i, j), flow = found.side.T, np.zeros(n)
+    np.add.at(flow, i, found.conductance * (direction[i] - direction[j]))
+    np.add.at(flow, j, found.conductance * (direction[j] - direction[i]))
+    has = found.area > 0
+    np.testing.assert_allclose(flow[has], (found.area - asked)[has], atol=1e-9)
+    for k in range(parts):
+        own = direction[part[sites.triangle] == k]
+        assert np.count_nonzero(own == 0) == 1 + np.count_nonzero(~has[part[sites.triangle] == k])

@@ -1,17 +1,21 @@
 """Cells have their masses on any surface in few steps, sites keep apart, and cutting along cells loses nothing."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 
 from omt_uv.solver import errors
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.partition import spacing
+from omt_uv.solver.partition.cells import geodesic_cells
 from omt_uv.solver.partition.cut_mesh import cut_along_cells
 from omt_uv.solver.partition.division import DivisionOptions, divide
 from omt_uv.solver.partition.face_labels import _joined, follow_faces
-from omt_uv.solver.partition.polar_coordinates import WindowMesh
+from omt_uv.solver.partition.polar_coordinates import WindowMesh, polar_coordinates
 from omt_uv.solver.partition.relaxation import sights
-from omt_uv.solver.partition.sites import allot, parts
+from omt_uv.solver.partition.sites import Sites, allot, parts
 from omt_uv.solver.partition.spacing import site_distances
 from omt_uv.solver.progress import drain
 
@@ -231,3 +235,22 @@ def test_a_division_is_told_in_the_units_of_the_mesh():
     # The least and the greatest of the squares of the three corners, at most.
     assert (one.pairs.nearest <= one.pairs.squared.min(axis=1) + 1e-9).all()
     assert (one.pairs.farthest >= one.pairs.squared.max(axis=1) - 1e-9).all()
+
+
+@pytest.mark.parametrize("wide", [0.5, 0.7, 1.0])
+@pytest.mark.parametrize("density", [False, True])
+def test_sites_of_a_strip_are_one_length_apart_and_cells_have_the_areas_of_the_strip(wide, density):
+    """Windows of three radii of a cell reach the next one, however long the cells are; the density plays no part."""
+    V, F = meshes.grid(12, 4)
+    V = np.column_stack([3 * V[:, 0] / np.ptp(V[:, 0]), wide * V[:, 1] / np.ptp(V[:, 1]), 0 * V[:, 0]])
+    mesh, x = WindowMesh(V, F), V[F].mean(axis=1)
+    at = [int(np.argmin(np.abs(x - [place, wide / 2, 0]).sum(axis=1))) for place in (0.5, 1.5, 2.5)]
+    sites = Sites(np.array(at), np.full((3, 3), 1 / 3))
+    pairs = polar_coordinates(mesh, sites, np.full(3, 9.0), np.arange(3))
+    mass = mesh.areas * (1 + 5 * density * x[:, 0])
+    cells = geodesic_cells(pairs, np.zeros(3), mass)
+    division = SimpleNamespace(sites=sites, asked=np.ones(3), pairs=pairs, cells=cells)
+    assert spacing._areas(mesh, division).sum() == pytest.approx(3 * wide)
+    places = sites.positions(V, F)
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 99 * np.eye(3)
+    np.testing.assert_allclose(site_distances(mesh, division), apart.min(axis=1), atol=1e-9)

@@ -278,3 +278,19 @@ def test_flat_and_inverted_tetrahedra_have_a_dilation_on_either_side():
         wrong = tet_mesh.tet_volumes(here, tets) <= 0
         share = tet_mesh.tet_volumes(there, tets) / tet_mesh.tet_volumes(there, tets).sum()
         assert found[wrong] == pytest.approx(np.log2(np.maximum(1e3 * len(tets) * share[wrong], 1)))
+
+
+@pytest.mark.parametrize("thin", [1.0, 1e-4, 1e-8, 1e-12])
+@pytest.mark.parametrize("seed", range(3))
+def test_slivers_that_a_map_keeps_have_no_dilation_and_whatever_has_a_share_there_has_its_own(thin, seed):
+    """Shares in the map are what logarithms make of those in the body, however small these are. In the map a share
+    below the least is taken for that, and not for more than it was."""
+    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    rng, tets = np.random.default_rng(seed), np.arange(80).reshape(20, 4)
+    size = thin ** rng.random(20)
+    flat, plain = (np.concatenate([corner * [1, 1, s] for s in sizes]) for sizes in (size, rng.uniform(0.5, 2, 20)))
+    here, there = (tet_mesh.tet_volumes(p, tets) / tet_mesh.tet_volumes(p, tets).sum() for p in (flat, plain))
+    assert dilation(flat, flat, tets) == pytest.approx(0, abs=1e-9)
+    assert dilation(flat, 7 * flat[:, [1, 2, 0]] + 3, tets) == pytest.approx(0, abs=1e-2)
+    assert (here * 2.0 ** dilation(flat, plain, tets)) == pytest.approx(there, rel=1e-9)
+    assert (there * 2.0 ** dilation(plain, flat, tets)) == pytest.approx(np.maximum(here, 1e-3 / 20), rel=1e-9)

@@ -43,12 +43,15 @@ def stitch(
 
 
 def _repeated(triangles: np.ndarray, number: np.ndarray) -> np.ndarray:
-    """Halfedges (k,) of edges inside of charts between samples (n,) that are joined elsewhere, or are the same."""
+    """Halfedges (k,) of edges inside of charts between samples (n,) that are the same, or are joined elsewhere.
+
+    The former come first: beside one of them, an edge that is split has halves that join the same two samples again.
+    """
     twin = twins(triangles)
     tail, head = halfedges(triangles)
     a, b = number[tail], number[head]
     inner, boundary = np.flatnonzero(twin > np.arange(len(twin))), np.flatnonzero(twin < 0)
     keys = np.concatenate([pair_keys(a[inner], b[inner]), np.unique(pair_keys(a[boundary], b[boundary]))])
     _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
-    again = count[place.ravel()[: len(inner)]] > 1
-    return inner[again | (a[inner] == b[inner])]
+    again, same = count[place.ravel()[: len(inner)]] > 1, a[inner] == b[inner]
+    return np.concatenate([inner[same], inner[again & ~same]])

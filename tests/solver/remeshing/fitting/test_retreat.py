@@ -10,6 +10,7 @@ from omt_uv import solver as omt
 from omt_uv.solver.contact.self_intersections import intersecting_pairs
 from omt_uv.solver.remeshing import remesh_component
 from omt_uv.solver.remeshing.edits.working_mesh import WorkingMesh
+from omt_uv.solver.remeshing.fitting import retreat
 from omt_uv.solver.remeshing.fitting.retreat import retreated
 
 
@@ -77,3 +78,27 @@ def test_as_few_faces_intersect_as_in_any_round():
     crossed[60:70, 2] = 0.3
     found = retreated(mesh_of(crossed, T), mesh_of(moved, T), V, T)
     assert len(intersecting_pairs(found.points, T)) <= len(intersecting_pairs(moved, T))
+
+
+@pytest.mark.parametrize("counts", [(5, 3, 4, 4), (5, 4, 2, 3, 1, 3), (5, 6, 7), (5, 3, 3), (5, 2, 0, 9), (4, 3, 1, 2, 2)])
+def test_of_all_rounds_the_first_with_fewest_meetings_is_kept(monkeypatch, counts):
+    """However many faces meet from round to round; none is looked at once nothing meets."""
+    V, moved, T = layers(0)
+    seen = []
+
+    class Counted:
+        def __init__(self, triangles):
+            assert triangles is T
+
+        def pairs(self, points):
+            seen.append(points)
+            count = counts[min(len(seen), len(counts)) - 1]
+            # More and more of them, so that every round takes more back.
+            return np.arange(2 * count).reshape(-1, 2) + len(seen)
+
+    monkeypatch.setattr(retreat, "FaceCrossings", Counted)
+    found = retreat.retreated(mesh_of(V, T), mesh_of(moved, T), V, T)
+    best = counts.index(min(counts))
+    assert found.points is seen[best] if best else found.points is moved
+    rounds = counts.index(0) if 0 in counts else retreat.ROUNDS
+    assert len(seen) == 1 + rounds
