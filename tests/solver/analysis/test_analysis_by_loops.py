@@ -254,8 +254,10 @@ def test_steps_are_smooth_between_their_ends(value, step):
     ],
 )
 def test_a_mirror_of_above_and_below_that_is_not_quite_one_is_chance(residual, normal, chance):
-    plane = SimpleNamespace(residual=residual * seam_costs.CHANCE, normal=np.array(normal, float))
-    assert seam_costs._is_chance(plane, SimpleNamespace(up=(0, 0, 2))) == chance
+    """On whichever side of the plane its normal is, and whichever way up is."""
+    for sign, up in ((1, 2), (1, -2), (-1, 2), (-1, -2)):
+        plane = SimpleNamespace(residual=residual * seam_costs.CHANCE, normal=sign * np.array(normal, float))
+        assert seam_costs._is_chance(plane, SimpleNamespace(up=(0, 0, up))) == chance
 
 
 def test_vertices_stand_in_the_order_of_their_places():

@@ -46,3 +46,14 @@ def test_only_edges_between_the_copies_cross_the_boundary(disk):
     crossing = inner[tail] & inner[head] & ((tail < len(V)) != (head < len(V)))
     np.testing.assert_array_equal(segment >= 0, crossing)
     np.testing.assert_array_equal(segment[flipped.twin], segment)
+
+
+def test_segments_are_numbered_from_wherever_the_loop_begins(disk):
+    """Which one an edge crosses hangs on no beginning: the last one, that ends where the loop begins, is as any."""
+    V, F, loop = disk
+    doubled, _ = double_disk(from_mesh(V, F), loop, len(V))
+    flipped, _ = make_delaunay(doubled, euclidean_diagonal)
+    segment, b = crossed_segment(flipped, loop, len(V)), len(loop)
+    for k in range(b):
+        turned = crossed_segment(flipped, np.roll(loop, -k), len(V))
+        np.testing.assert_array_equal(turned, np.where(segment >= 0, (segment - k) % b, -1))

@@ -22,11 +22,12 @@ from omt_uv.solver.parameterization.convex_maps import (
     with_figures,
 )
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
-from omt_uv.solver.parameterization.polygons import corner_solver
+from omt_uv.solver.parameterization.polygons import convexity, corner_solver
 from omt_uv.solver.parameterization.polygons.convexity import dented_faces, keep_convex, reflex_triangles
 from omt_uv.solver.parameterization.polygons.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.continuation_rules import QUALITIES
 
 
 def darts():
@@ -253,3 +254,22 @@ def test_of_several_rounds_that_with_fewest_folds_is_kept(monkeypatch, folds, ke
     monkeypatch.setattr(convex_maps, "_keeps", lambda *_: True)
     (found,) = drain(with_drawn_triangles(surface, [chart], [start], [None], MapOptions()))
     assert found.folds == kept
+
+
+@pytest.mark.parametrize("quality", ["draft", "standard", "exact"])
+def test_what_is_spared_and_what_is_off_are_together_all_that_may_be_off(quality, monkeypatch):
+    """Of several maps each by itself: none is off by more than its own areas allow, or the goal where they are better."""
+    surface, chart, chart_map = darts()
+    goal = QUALITIES[quality].area_error
+    maps = [replace(chart_map, area_l1=share * goal) for share in (0.0, 0.3, 1.0, 1.1, 2.0, 50.0)]
+    given = []
+    monkeypatch.setattr(convexity, "keep_convex", lambda *words: given.append(words) or {})
+    options, count = MapOptions(quality=quality), len(maps)
+    task = convex_maps._Opening(surface, [chart] * count, [None] * count, options, [None] * count, {})
+    for which in (np.arange(count), np.array([4, 1])):
+        some = [maps[k] for k in which]
+        assert task.kept(some, which) == some
+        off = np.array([m.area_l1 for m in some])
+        spare = np.array(given.pop()[6])
+        assert (spare >= 0).all()
+        assert spare + off == pytest.approx(convex_maps.AREA_KEPT * np.maximum(off, goal))

@@ -170,6 +170,21 @@ def test_a_stage_ends_where_shear_and_areas_settle(shears, errors, share, brisk,
     assert found.steps == ends
 
 
+@pytest.mark.parametrize("brisk", [True, False])
+@pytest.mark.parametrize("pattern", range(16))
+def test_two_steps_in_a_row_that_keep_what_they_promise_end_a_brisk_stage(pattern, brisk):
+    """One alone, however nearly things have settled, ends none."""
+    kept = [bool(pattern >> k & 1) for k in range(4)]
+    energy, steps = 10.0, []
+    for each in [*kept, False, False]:
+        energy -= 0.1 if each else 0.001
+        steps.append((1.0, energy, 0.1, 0.05))
+    limits = {"brisk": brisk, "tolerance": 1e-6, "loose_tolerance": 1e-6, "max_steps": 6}
+    found, _, _ = end_of(steps, shear=lambda w: 0.95 ** w[0], **limits)
+    pairs = [k + 1 for k in range(1, 4) if kept[k - 1] and kept[k]]
+    assert found.steps == (pairs[0] if brisk and pairs else 6)
+
+
 # ---- stages -------------------------------------------------------------------------------------------------
 
 QUALITY = Quality(area_error=0.01, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=50, tolerance=3e-2)

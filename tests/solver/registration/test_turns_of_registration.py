@@ -470,3 +470,35 @@ def test_what_was_only_just_straightened_is_relaxed_with_its_landmarks_held(monk
     mesh = coarse_start.FewVertices(np.arange(12), F, V, np.array([7, 3]), None)
     assert drain(coarse_start._relaxed(case, mesh, "places")) == "relaxed"
     assert asked == [([3, 7], ("placed", "places"), 5)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_functional_maps_take_every_coarse_vertex_where_it_corresponds_to_in_whatever_order_it_comes(seed, monkeypatch):
+    """A surface corresponds to itself: all coarse vertices are at their own places, landmarks at theirs."""
+    V, F = meshes.icosphere(2)
+    rng, n = np.random.default_rng(seed), len(V)
+    chosen, number = rng.permutation(n)[:40], np.arange(n)[:, None]
+    marks = np.array([3, 17])
+    pair = SimpleNamespace(
+        vertices=V,
+        landmarks=chosen[marks],
+        targets=(np.zeros(2, int), np.eye(3)[:2]),
+        target=SimpleNamespace(triangles=F),
+    )
+    targets = SimpleNamespace(domain=np.full((2, 3), 9.0))
+    case = SimpleNamespace(
+        pair=pair, spectra=(number, number), carrier=SimpleNamespace(domain=V), aligned=V, targets=targets
+    )
+    mesh = SimpleNamespace(chosen=chosen, landmarks=marks, carried=lambda start, at: at)
+
+    def itself(source, other, near, landmarks):
+        assert near.tolist() == source[:, 0].tolist() and len(source) == coarse_start.SAMPLES
+        assert landmarks[0].tolist() == chosen[marks][:, None].tolist()
+        return near
+
+    monkeypatch.setattr(coarse_start, "SAMPLES", 100)
+    monkeypatch.setattr(coarse_start, "refined_correspondence", itself)
+    places = drain(coarse_start._corresponding(case, mesh, V[chosen]))
+    expected = V[chosen].copy()
+    expected[marks] = 9.0
+    np.testing.assert_array_equal(places, expected)

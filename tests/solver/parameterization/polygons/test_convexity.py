@@ -93,6 +93,13 @@ def test_symmetric_maps_stay_symmetric(turn):
     assert (signed_areas(new, vertex[corner]) > 0).all()
     moved = (new @ [1, 1j] - (new @ [1, 1j]).mean()) / turn
     np.testing.assert_allclose(moved[image], -moved.conj(), atol=1e-12)
+    # What one side holds the other holds, too.
+    for held in ([16], [18], [9], [16, 11], [23, 25]):
+        fixed = np.isin(chart.vertex_ids, held)
+        found = keep_convex(surface, [chart], [uv], [fixed], [None], [50.0], [np.inf]).get(0, uv)
+        np.testing.assert_array_equal(found[fixed], uv[fixed])
+        one = (found @ [1, 1j] - 3) / turn
+        np.testing.assert_allclose(one[image], -one.conj(), atol=1e-12)
 
 
 @pytest.mark.parametrize("sides", [16, 48])
