@@ -2,17 +2,23 @@
 
 import ctypes
 import os
+import sys
 
 import pytest
 
 from omt_uv.files.silence import _flush, silence
 
 LIBRARY = ctypes.CDLL(None) if os.name == "posix" else None
+if LIBRARY is not None:
+    LIBRARY.fdopen.restype = ctypes.c_void_p
+    # What is printed here waits in a buffer of its own, whatever this process does with its output.
+    BUFFER = ctypes.c_void_p(LIBRARY.fdopen(1, b"w"))
+    LIBRARY.setvbuf(BUFFER, None, 0, ctypes.c_size_t(4096))
 by_c = pytest.mark.skipif(LIBRARY is None, reason="C's own buffer is reached by its name here")
 
 
 def in_python(text):
-    print(text, end="")
+    sys.stdout.write(text)
 
 
 def past_python(text):
@@ -20,7 +26,7 @@ def past_python(text):
 
 
 def in_c(text):
-    LIBRARY.printf(b"%s", text.encode())
+    LIBRARY.fputs(text.encode(), BUFFER)
 
 
 WAYS = [in_python, past_python, pytest.param(in_c, marks=by_c)]

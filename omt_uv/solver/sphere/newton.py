@@ -129,10 +129,10 @@ class SphereProblem:
         return energy_of(self.faces, *derivatives(self.faces, corner), self.area_weight)
 
     def area_error(self, positions: np.ndarray) -> float:
-        """The larger of the share of the area in the wrong place and the deviation of the areas' ratios."""
+        """The deviation of the areas' ratios, which is no less than the share of the area in the wrong place."""
         share = self.target / self.target.sum()
         ratio = self.spherical_areas(positions) / self.target
-        return float(max(share @ np.abs(ratio - 1), np.sqrt(share @ (ratio - 1) ** 2)))
+        return float(np.sqrt(share @ (ratio - 1) ** 2))
 
     def projected_area_error(self, positions: np.ndarray) -> float:
         """Share of the area in the wrong place, of projected faces against their own targets."""

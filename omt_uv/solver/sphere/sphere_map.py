@@ -193,12 +193,11 @@ def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
 
 
 def _as_given(positions: np.ndarray, surface: ClosedSurface, target: np.ndarray, error: float) -> bool:
-    """Whether triangles as they were given, with their targets (m,), have areas not much farther off than quads, in the
-    mean and in their deviation: a few that are off by half say nothing in the mean."""
+    """Whether triangles as they were given, with their targets (m,), have areas not much farther off than quads, by
+    their deviation, which is no less than the mean: a few that are off by half say nothing in that."""
     share = target / target.sum()
     off = np.abs(spherical_areas(positions, surface.triangles) / (4 * np.pi * share) - 1)
-    far = max(share @ off, np.sqrt(share @ off**2))
-    return bool(far <= AREA_KEPT * error and signed_volumes(positions, surface.triangles).min() > 0)
+    return bool(np.sqrt(share @ off**2) <= AREA_KEPT * error and signed_volumes(positions, surface.triangles).min() > 0)
 
 
 def _area_warning(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray, polygons: np.ndarray | None) -> str:

@@ -308,3 +308,30 @@ def test_steps_are_as_exact_wherever_the_probes_come_by_on_their_way(place, widt
     whole = [special.erf((x - place) / width) for x in (start[:, 0], start[:, 0] + 8)]
     across = start[:, 1] + width * np.sqrt(np.pi) / 2 * (whole[1] - whole[0])
     assert np.abs(points[:, 1] - across).max() < 3 * 8 * tolerance
+
+
+@pytest.mark.parametrize("power", [1, 3, 6])
+def test_every_step_has_the_fields_of_its_own_time(power):
+    """Where all points go alike at any moment, the way is the integral of their speed, which steps of the fourth order
+    have to the last digit as long as that is a cubic. Each step begins where the one before ends."""
+    knots = np.array([0.0, 0.7, 2.0])
+    asked = []
+
+    class Wind:
+        def __init__(self, time):
+            self.time = time
+            asked.append(time)
+
+        def __call__(self, points):
+            return self.time**power * np.ones_like(points)
+
+    plan = integration.planned_steps(lambda j, time: Wind(time), knots, np.zeros((2, 3)), 1e-6)
+    at = 0.0
+    for steps, end in zip(plan, knots[1:], strict=True):
+        for step in steps:
+            times = [field.time for field in step.fields]
+            assert times == pytest.approx([at, at + step.length / 2, at + step.length], abs=1e-12)
+            at += step.length
+        assert at == pytest.approx(end)
+    found = integration.carried(np.zeros((2, 3)), [step for steps in plan for step in steps])
+    assert found == pytest.approx(2 ** (power + 1) / (power + 1), abs=1e-12 if power <= 3 else 1e-5)

@@ -258,7 +258,7 @@ def test_of_several_rounds_that_with_fewest_folds_is_kept(monkeypatch, folds, ke
 
 @pytest.mark.parametrize("quality", ["draft", "standard", "exact"])
 def test_what_is_spared_and_what_is_off_are_together_all_that_may_be_off(quality, monkeypatch):
-    """Of several maps each by itself: none is off by more than its own areas allow, or the goal where they are better."""
+    """Of several maps each by itself: by what its own areas allow, or the goal where these are better."""
     surface, chart, chart_map = darts()
     goal = QUALITIES[quality].area_error
     maps = [replace(chart_map, area_l1=share * goal) for share in (0.0, 0.3, 1.0, 1.1, 2.0, 50.0)]

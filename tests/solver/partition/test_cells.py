@@ -98,7 +98,10 @@ def test_the_direction_mends_the_areas_of_every_part_and_keeps_one_weight_of_eac
     """Areas of cells change by the Laplacian of the direction: that is what they lack, on each part by itself."""
     V, F, *_ = flat(5, 1)
     m, rng = len(F), np.random.default_rng(seed)
-    V, F = np.concatenate([V + [2 * k, 0, 0] for k in range(parts)]), np.concatenate([F + k * len(V) for k in range(parts)])
+    V, F = (
+        np.concatenate([V + [2 * k, 0, 0] for k in range(parts)]),
+        np.concatenate([F + k * len(V) for k in range(parts)]),
+    )
     n = 7 * parts
     sites = Sites(np.repeat(m * np.arange(parts), 7) + rng.integers(m, size=n), inner(rng.dirichlet(np.ones(3), n)))
     # In no order of their parts.

@@ -80,7 +80,9 @@ def test_as_few_faces_intersect_as_in_any_round():
     assert len(intersecting_pairs(found.points, T)) <= len(intersecting_pairs(moved, T))
 
 
-@pytest.mark.parametrize("counts", [(5, 3, 4, 4), (5, 4, 2, 3, 1, 3), (5, 6, 7), (5, 3, 3), (5, 2, 0, 9), (4, 3, 1, 2, 2)])
+@pytest.mark.parametrize(
+    "counts", [(5, 3, 4, 4), (5, 4, 2, 3, 1, 3), (5, 6, 7), (5, 3, 3), (5, 2, 0, 9), (4, 3, 1, 2, 2)]
+)
 def test_of_all_rounds_the_first_with_fewest_meetings_is_kept(monkeypatch, counts):
     """However many faces meet from round to round; none is looked at once nothing meets."""
     V, moved, T = layers(0)
