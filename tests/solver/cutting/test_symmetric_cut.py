@@ -133,6 +133,37 @@ def open_box(across: int) -> tuple[np.ndarray, list]:
     return V, quads
 
 
+def prism(sides: int) -> tuple[np.ndarray, list]:
+    """A tube of quads with so many sides, an odd number, without ends: its own image in x alone, in a plane through a
+    row of vertices and, opposite to it, through the midst of a row of quads."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    V = [((1 + 0.1 * y) * np.sin(a), y, np.cos(a) + 0.1 * y * y) for y in range(5) for a in angle]
+    rows, along = sides * np.arange(4)[:, None], np.arange(sides)
+    onwards = (along + 1) % sides
+    quads = [rows + along, rows + onwards, rows + sides + onwards, rows + sides + along]
+    return np.array(V), np.stack(quads, axis=2).reshape(-1, 4).tolist()
+
+
+@pytest.mark.parametrize("over", [False, True])
+@pytest.mark.parametrize("sides", [7, 9, 11])
+def test_a_line_through_the_midst_of_polygons_ends_at_both_boundaries(monkeypatch, sides, over):
+    """It ends at the sides that it crosses there, by their ends in the half, whichever way round polygons are."""
+    V, quads = prism(sides)
+    component = component_cut(monkeypatch, polygon_surface(V, [q[::-1] if over else q for q in quads]))
+    (half,) = symmetric_halves(component)
+    ends = np.flatnonzero(half.line_ends)
+    assert len(ends) == 2 and half.side[ends].all() and half.on_line[ends].any() == half.on_line[ends].all()
+    at = component.positions
+    beside = np.linalg.norm(at[ends] - at[half.image[ends]], axis=1)
+    assert sorted(at[ends, 1]) == pytest.approx([at[:, 1].min(), at[:, 1].max()])
+    # One side of each boundary, of which one is larger than the other, whatever the unit.
+    outline = [np.ptp(at[np.isclose(at[:, 1], level), 0]) for level in at[ends, 1]]
+    assert max(beside) == pytest.approx(1.4 * min(beside)) and max(outline) == pytest.approx(1.4 * min(outline))
+    # Nothing of it is cut: the tube opens along the row of vertices, all of it.
+    found, _ = symmetric_cut(half, 0, 0.0)
+    assert is_disk(component, found) and found.sum() == 4
+
+
 def test_a_closed_body_is_opened_by_one_symmetric_tree():
     V, F = meshes.icosphere(3)
     component = component_of(V * [1.0, 1.3, 3.0], F)

@@ -69,3 +69,24 @@ def test_some_polygons_after_the_others_are_to_the_bit_what_all_at_once_are(scen
     # A step short of the first fold folds nothing, one beyond it does.
     far = whole[0][2]
     assert [has_folds(faces, w + share * far * step) for share in (0.999, 1.001)] == [False, True]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e4])
+def test_flat_quads_have_the_areas_of_their_outlines_darts_too_whichever_diagonal_cuts_them(unit, seed):
+    """Sums by plain formula; each asks for its share, and all in one density for as much each."""
+    rng = np.random.default_rng(seed)
+    corner = np.array([[0, 0], [1, 0.1], [1.1, 1], [0, 0.9]])
+    quads = corner + 0.2 * rng.random((12, 4, 2))
+    # A third of them are darts: one corner is beyond the diagonal beside it.
+    quads[::3, 2] = [0.3, 0.35] + 0.05 * rng.random((4, 2))
+    quads = unit * (quads + 3 * np.arange(12)[:, None, None])
+    x, y = quads[:, :, 0], quads[:, :, 1]
+    outline = 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+    V = np.column_stack([quads.reshape(-1, 2), np.zeros(48)])
+    for turn in (0, 1):
+        F, owner = polygons.cut(np.arange(48).reshape(12, 4), turn)
+        found = polygon_elements(V, F, face_areas(V, F), owner)
+        order = np.argsort(found.polygon[-48:].reshape(12, 4)[:, 0])
+        assert (order == np.arange(12)).all() and found.area == pytest.approx(outline / outline.sum(), rel=1e-9)
+        assert found.ratio == pytest.approx(found.ratio.mean(), rel=1e-9)
