@@ -16,6 +16,7 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import search
+from omt_uv.solver.seams import symmetric_base as symmetric_bases
 from omt_uv.solver.seams.search import SeamSearch
 from omt_uv.solver.seams.symmetric_base import _paths, symmetric_base
 
@@ -147,3 +148,21 @@ def test_paths_of_a_cut_have_every_edge_once_and_a_loop_is_two_of_them(loop, tai
     assert len(paths) == 2 + (tail > 0)
     halves = [path for path in paths if tail in path and (path.max() > tail)]
     assert len(halves) == 2 and set(halves[0]) & set(halves[1]) == {halves[0][0], halves[0][-1]}
+
+
+@pytest.mark.parametrize("holes", [[*EYES, *-EYES], [*EYES, *MOUTH, *-EYES]], ids=["four", "five"])
+def test_whatever_is_joined_is_joined_on_both_sides(holes, monkeypatch):
+    """At every turn, arcs and boundaries alike: an arc comes with its image."""
+    ways, base, seen = symmetric_bases._ways, symmetric_bases.symmetric_base, []
+
+    def watched(mirror, joined, target, crossing):
+        seen.append((joined.sum(), (joined[mirror.image] == joined).mean(), (target[mirror.image] == target).mean()))
+        return ways(mirror, joined, target, crossing)
+
+    monkeypatch.setattr(symmetric_bases, "_ways", watched)
+    monkeypatch.setattr(search, "symmetric_base", lambda *given: (base(*given), seen.append(None))[0])
+    seams_of(egg(holes), 0.5)
+    turns = seen[: seen.index(None)]
+    count = [turn[0] for turn in turns]
+    assert len(turns) > 1 and (np.diff(count) > 0).all()
+    assert [turn[1:] for turn in turns] == [(1.0, 1.0)] * len(turns)
