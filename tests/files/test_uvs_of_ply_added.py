@@ -65,3 +65,15 @@ def test_a_file_that_is_none_gives_nothing(package, tmp_path):
     (tmp_path / "a.ply").write_text("ply\nformat ascii 1.0\n")
     package("files.ply_uvs").add_uvs(tmp_path / "a.ply", obj)
     assert not obj.data.uv_layers and bpy.context.object == obj
+
+
+@pytest.mark.parametrize("kept", [[0], [1], [1, 0], [0, 1]])
+@pytest.mark.parametrize(("names", "corners"), [(("u", "v"), False), ((), True)])
+def test_faces_that_are_there_have_their_own_uvs_whatever_others_the_file_has(package, tmp_path, names, corners, kept):
+    """Whoever reads it may leave some out, and have them in another order."""
+    path = tmp_path / "a.ply"
+    expected = written(path, names, corners).reshape(2, 4, 2)
+    obj = scenes.add(PLACES, [FACES[k] for k in kept])
+    package("files.ply_uvs").add_uvs(path, obj)
+    found = scenes.uv_of(obj).reshape(-1, 4, 2)
+    np.testing.assert_allclose(found, expected[kept], atol=1e-6)

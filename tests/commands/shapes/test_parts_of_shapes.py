@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -311,3 +312,27 @@ def test_numbers_of_vertices_end_below_their_count(package, markers, good):
     else:
         with pytest.raises(package("commands.common").CommandError, match="there is no vertex 8"):
             distance._markers(options, "in.obj", pairs)
+
+
+SUFFIXES = (".blend", ".obj", ".glb", ".gltf", ".fbx", ".ply", ".stl", ".off", "")
+
+
+@pytest.mark.parametrize("what", ["face_sets", "attribute", "seams", "materials", "points", "meshes"])
+def test_what_a_file_keeps_hangs_on_no_capitals_and_whoever_is_refused_is_told_what_does(package, what):
+    formats = package("commands.shapes.formats")
+
+    def told(suffix):
+        try:
+            formats.check_kept(Path(f"a.b/c{suffix}"), what)
+        except formats.CommandError as error:
+            return str(error)
+
+    refused = [suffix for suffix in SUFFIXES if told(suffix)]
+    # Blender's own files keep everything.
+    assert ".blend" not in refused and (refused == []) == (what == "meshes")
+    for suffix in SUFFIXES:
+        for other in (suffix.upper(), suffix.capitalize(), suffix[:2] + suffix[2:].upper()):
+            assert (told(other) is None) == (suffix not in refused)
+        if suffix in refused:
+            kept = told(suffix).partition("kept by ")[2].partition(" alone")[0].split()
+            assert set(SUFFIXES) - set(refused) == set(kept) and what.split("_")[0] in told(suffix)
