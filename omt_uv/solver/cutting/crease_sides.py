@@ -39,6 +39,8 @@ SHARP = 0.8
 ALL = 0.95
 MOST_SIDES = 2_000
 FEW_SIDES = 64
+# Or so many sides for each triangle: of noise every triangle is one, and of a fine body a side has many.
+PER_TRIANGLE = 0.25
 # A body of more sides than this has no hard surface if those with at most so much curvature in the mean, in radians, at
 # the vertices within have less than that share of its area: low ones of animals and people are folded into many sides,
 # too, but these swell. Where one of very many has hardly any borders within so much, in radians, of a right angle, as
@@ -194,8 +196,7 @@ def hard_sides(component: CutComponent, may_swell: bool = False) -> tuple[np.nda
     curvature = np.abs(defects(component))
     bent = _inner_curvature(component, side, border, curvature, len(area))
     unrolls = bent <= ROUND
-    # Of noise every triangle is a side.
-    mostly, few = area[unrolls & large].sum() / area.sum(), len(area) <= MOST_SIDES
+    mostly, few = area[unrolls & large].sum() / area.sum(), len(area) <= max(MOST_SIDES, PER_TRIANGLE * len(side))
     if not may_swell and len(area) > SIMPLE and _swells(component, side, border, fold, area, bent):
         return None
     sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)

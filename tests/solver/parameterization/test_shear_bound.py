@@ -441,8 +441,39 @@ def test_pieces_that_miss_the_bound_keep_what_was_cut_of_them(of_pieces, thinned
     monkeypatch.setattr(shear_bound, "_first_round", lambda *_: worked(before))
     monkeypatch.setattr(shear_bound, "come_apart", lambda _, last, *__: worked(seen.append(last.settled)))
     monkeypatch.setattr(shear_bound, "_made_shorter", lambda _, best, *__: worked(best))
+    monkeypatch.setattr(shear_bound, "_along_all_creases", lambda _, best, *__: worked(best))
     drain(shear_bound.bound_shear(search, SimpleNamespace(warnings=()), [], None, of_pieces=of_pieces))
     assert sorted(seen[0]) == (sorted(within(before.charts[0])) if settled else [])
+
+
+@pytest.mark.parametrize("far, at_once", [(1.5, False), (1.2, True)])
+def test_what_misses_the_bound_by_much_comes_apart_along_creases_before_it_is_searched_again(far, at_once, monkeypatch):
+    """The square shears by 2.67, and the bound is 1.3."""
+    _, search, seam = halves(8, 1.3)
+    monkeypatch.setattr(shear_bound, "FAR", far)
+    begun, done = made_round(search, seam, [1.2, 1.2], []), list[str]()
+    monkeypatch.setattr(shear_bound, "_first_round", lambda *_: worked(begun))
+    for name, found in (("_in_halves", begun), ("_along_all_creases", begun), ("_made_shorter", begun)):
+        monkeypatch.setattr(
+            shear_bound, name, lambda *_, name=name, found=found, **__: worked(done.append(name) or found)
+        )
+    monkeypatch.setattr(shear_bound, "come_apart", lambda *_: worked(done.append("come_apart")))
+    drain(shear_bound.bound_shear(search, SimpleNamespace(warnings=()), [], None))
+    assert done == ["_in_halves", *["_along_all_creases"] * at_once, "come_apart", "_made_shorter"]
+
+
+def test_the_ends_of_a_helical_gear_come_off_and_its_teeth_stay_together():
+    """Searched again, it comes in eight strips."""
+    V, F = meshes.helical_gear(teeth=8, rings=10, around=16)
+    ends = np.flatnonzero(np.ptp(V[F, 2], axis=1) == 0)
+    result = unwrapped(triangle_surface(V, F), 1.35)
+    below = V[F[ends], 2].mean(axis=1) == 0
+    assert {frozenset(chart.faces) for chart in result.charts} == {
+        frozenset(np.setdiff1d(np.arange(len(F)), ends)),
+        frozenset(ends[below]),
+        frozenset(ends[~below]),
+    }
+    assert max(mean_shear(result)) <= 1.35
 
 
 @pytest.mark.parametrize("shears, worth", [((1.1, 1.3), True), ((1.1, 1.32), False), ((1.1, 1.36), True), ((), True)])
