@@ -41,7 +41,8 @@ def to_plane(points: np.ndarray, projection: str) -> np.ndarray:
     _check(projection, PICTURES)
     if projection == OCTAHEDRAL:
         return 0.5 * (octahedral_to_plane(points) + 1)
-    x, y, z = np.moveaxis(points, -1, 0)
+    # Of columns with strides numpy has another last digit whenever what it finds comes to lie right behind them.
+    x, y, z = np.ascontiguousarray(np.moveaxis(points, -1, 0))
     u = 0.5 + np.arctan2(x, -y) / (2 * np.pi)
     if projection == SINUSOIDAL:
         u = 0.5 + (u - 0.5) * np.hypot(x, y) / np.sqrt(x * x + y * y + z * z)

@@ -71,10 +71,14 @@ def bounded(monkeypatch):
 
     def run(*rounds, apart=(), crossed=(), spared=None, crossing="crossing", ask_end=None, pieces=False, may_part=True):
         asked, rest, parts, crossings = [], list(rounds[1:]), list(apart), list(crossed)
-        joined, halved = [], []
+        joined, halved, creased = [], [], []
 
         def halves(search, last, map_charts, early, stuck):
             halved.append((last.name, stuck))
+            return worked(last)
+
+        def creases(search, last, map_charts, early):
+            creased.append(last.name)
             return worked(last)
 
         def first(search, prepared, maps, map_charts, free, early):
@@ -126,6 +130,7 @@ def bounded(monkeypatch):
         monkeypatch.setattr(shear_bound, "_made_shorter", shorter)
         monkeypatch.setattr(shear_bound, "_joined_again", again)
         monkeypatch.setattr(shear_bound, "_in_halves", halves)
+        monkeypatch.setattr(shear_bound, "_along_all_creases", creases)
         monkeypatch.setattr(shear_bound, "JOINING", 0.0)
 
         def result(best, search, warnings, early, is_short):
@@ -145,6 +150,7 @@ def bounded(monkeypatch):
         # Charts are joined at the very end, of what there is then, unless somebody waits for it.
         assert joined == ([] if found[1] else [(rounds[0].name, found[0])])
         assert halved == [(rounds[0].name, True)]
+        assert creased == [one.name for one in rounds[:1] if one.excess > shear_bound.FAR]
         # A round that is broken off is done anew by what makes the best shorter.
         assert min(fractions) >= 0 and max(fractions) <= 1 + 1e-9
         return found, asked, fractions
@@ -196,7 +202,7 @@ def test_rounds_go_on_until_the_bound_is_kept(bounded):
     assert margins == pytest.approx([shear_bound.MARGIN, shear_bound.MARGIN**0.5])
     assert [r.shares_asked[0][1] for r in rounds[:2]] == [[np.inf], [0.25]]
     # Every round takes half of what is left, the last what the search for shorter cuts does.
-    assert fractions[4:8] == pytest.approx([0, 0.15, 0.15, 0.5]) and fractions[-2:] == pytest.approx([0.75, 1.0])
+    assert fractions[6:10] == pytest.approx([0, 0.15, 0.15, 0.5]) and fractions[-2:] == pytest.approx([0.75, 1.0])
 
 
 def test_no_more_than_so_many_rounds(bounded):
