@@ -231,37 +231,25 @@ def torus(major=24, minor=12, radius=0.4):
     return V, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
 
 
-# ---- polygons -----------------------------------------------------------------------------------------------
-
-
 def helical_gear(teeth=8, rings=10, around=16, twist=1.0, taper=0.5, height=1.2):
     """A closed cone with so many teeth, that wind about its axis by an angle; `around` vertices a tooth."""
     count = teeth * around
     angle = 2 * np.pi * np.arange(count) / count
     out = 1 + 0.25 * np.tanh(3 * np.sin(teeth * angle)) / np.tanh(3)
+    # From the middle of one end to that of the other: a ring within each, and those of the teeth.
+    level = np.array([0, *np.arange(rings + 1) / rings, 1])[:, None]
+    r = (1 - taper * level) * [0 * out + 0.5, *[out] * (rings + 1), 0 * out + 0.5]
+    turned, z = angle + twist * level, height * level + 0 * angle
+    V = np.stack([r * np.cos(turned), r * np.sin(turned), z], axis=2).reshape(-1, 3)
+    a = np.arange(len(V)).reshape(-1, count)
+    b = np.roll(a, -1, axis=1)
+    corners = [(a[:-1], b[:-1], b[1:]), (a[:-1], b[1:], a[1:]), (b[0], a[0], 0 * a[0] + len(V))]
+    corners.append((a[-1], b[-1], 0 * a[-1] + len(V) + 1))
+    F = [np.stack(each, axis=-1).reshape(-1, 3) for each in corners]
+    return np.concatenate([V, [[0, 0, 0], [0, 0, height]]]), np.concatenate(F)
 
-    def ring(level, radius):
-        size, turned = (1 - taper * level) * radius, angle + twist * level
-        return np.column_stack([size * np.cos(turned), size * np.sin(turned), np.full(count, height * level)])
 
-    levels = np.arange(rings + 1) / rings
-    V = np.concatenate(
-        [*(ring(level, out) for level in levels), ring(0, 0.5), ring(1, 0.5), [[0, 0, 0], [0, 0, height]]]
-    )
-    here = np.arange(count)
-    there = (here + 1) % count
-
-    def band(low, high):
-        a, b, c, d = (start * count + to for start, to in ((low, here), (low, there), (high, there), (high, here)))
-        return [np.column_stack([a, b, c]), np.column_stack([a, c, d])]
-
-    fan = [
-        np.column_stack([k * count + here, k * count + there, 0 * here + len(V) - rings + k - 3])
-        for k in (rings + 1, rings + 2)
-    ]
-    side = [f for k in range(rings) for f in band(k, k + 1)]
-    F = [*side, *band(rings + 1, 0), fan[0][:, ::-1], *band(rings, rings + 2), fan[1]]
-    return V, np.concatenate(F)
+# ---- polygons -----------------------------------------------------------------------------------------------
 
 
 def climbed(V, F, begin, steps, up):
