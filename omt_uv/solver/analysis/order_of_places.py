@@ -102,3 +102,20 @@ def lowest_first(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (m,3) from their lowest vertex on, and which corners (m,3) these were."""
     turn = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3 if len(triangles) else np.zeros((0, 3), np.int64)
     return np.take_along_axis(triangles, turn, axis=1), turn
+
+
+def order_of_rows(*keys: np.ndarray) -> np.ndarray:
+    """The stable ascending order (k,) of rows of integers >= 0, column (k,) by column, the first one first; what fits
+    into one integer is compared at once.
+
+    >>> order_of_rows(np.array([1, 0, 1]), np.array([2, 3, 1]))
+    array([1, 2, 0])
+    """
+    packed, room = list[np.ndarray](), -1
+    for key in keys:
+        bits = int(key.max(initial=0)).bit_length()
+        if bits > room:
+            packed, room = [*packed, key.astype(np.int64)], 63 - bits
+        else:
+            packed[-1], room = packed[-1] << bits | key.astype(np.int64), room - bits
+    return np.lexsort(packed[::-1])

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .geometry import bounds, extents, lengths
+from .geometry import bounds, extents, lengths, of_corners
 from .topology import distinct, halfedges, pair_keys, pair_up, row_labels
 
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
@@ -130,8 +130,7 @@ class _Polygons:
     def __init__(self, positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None):
         faces = np.arange(len(triangles)) if faces is None else distinct(faces)[1]
         self.number = faces
-        pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * len(positions) + triangles.ravel())
-        self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
+        self.polygon, self.vertex = _corners(triangles, faces, len(positions))
         self.sides = np.bincount(self.polygon)
         self.first = np.cumsum(self.sides) - self.sides
         self.extent = float(extents(positions).max())
@@ -249,6 +248,20 @@ class _Polygons:
         # Where nothing is near, what is nearest takes long to find.
         far, other = self.centre_tree.query(_reflected(self.centres[polygons], normal), distance_upper_bound=2 * near)
         return other if far.max() <= near and (self.sides[other] == self.sides[polygons]).all() else None
+
+
+def _corners(triangles: np.ndarray, faces: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """The polygon and the vertex of every corner (c,) of polygons faces (m,), counted from 0, of triangles (m,3) of n
+    vertices: by polygon, and then by vertex."""
+    low, high = of_corners(np.minimum, triangles), of_corners(np.maximum, triangles)
+    corners = np.column_stack([low, of_corners(np.add, triangles) - low - high, high])
+    if int(faces.max(initial=-1)) + 1 == len(faces) and (np.diff(corners, axis=1) > 0).all():
+        # What is in order already, but for that of the triangles, takes longest to sort.
+        ordered = np.empty(corners.shape, np.int64)
+        ordered[faces] = corners
+        return np.repeat(np.arange(len(faces)), 3), ordered.ravel()
+    pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * n + triangles.ravel())
+    return pairs // n, pairs % n
 
 
 def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

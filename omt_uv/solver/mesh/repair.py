@@ -157,7 +157,7 @@ def _pair_sides(surface: Surface, gluing: Gluing, layer: np.ndarray) -> tuple[Gl
     first = np.flatnonzero(np.diff(key[order], prepend=-1))
     h = order[first[np.diff(first, append=len(key)) > 2]]
     torn = np.unique(np.stack([np.minimum(a[h], b[h]), np.maximum(a[h], b[h])], axis=1), axis=0)
-    first, second = pair_up(key)
+    first, second = pair_up(key, order)
     first = np.concatenate([gluing.first, sides[first]])
     second = np.concatenate([gluing.second, sides[second]])
     return replace(gluing, first=first, second=second), torn

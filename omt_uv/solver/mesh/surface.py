@@ -17,9 +17,9 @@ from ..errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .geometry import cross3, lengths, of_corners, part_by_part, turned_by
+from .geometry import bounds, cross3, lengths, of_corners, part_by_part, turned_by
 from .gluing import Gluing, polygon_gluing
-from .topology import are_among, distinct, next_corners, pair_keys, pair_up, row_labels
+from .topology import FEW_CORNERS, are_among, distinct, next_corners, pair_keys, pair_up, places_in_table, row_labels
 
 # A triangle whose area is below this share of its longest side squared is a line.
 DEGENERATE = 1e-10
@@ -113,13 +113,18 @@ def degenerate_triangles(
     0, of triangles that only count next to those of the same one
     """
     area, size = part_by_part(lambda some: _relative_areas(positions[some]), triangles).T
-    begin = np.zeros(1, np.int64) if owner is None else np.searchsorted(owner, np.arange(int(owner[-1]) + 1))
-    high, low = (
-        reduced.reduceat(part_by_part(lambda some, of=reduced: of_corners(of, positions[some]), triangles), begin)
-        for reduced in (np.maximum, np.minimum)
-    )
-    extent = (high / 2 - low / 2).max(axis=1)
-    extent = extent[0] if owner is None else extent[owner]
+    if owner is None or owner[-1] == 0:
+        used = np.zeros(len(positions), bool)
+        used[triangles] = True
+        low, high = bounds(positions if used.all() else positions[used])
+        extent = (high / 2 - low / 2).max()
+    else:
+        begin = np.searchsorted(owner, np.arange(int(owner[-1]) + 1))
+        high, low = (
+            reduced.reduceat(part_by_part(lambda some, of=reduced: of_corners(of, positions[some]), triangles), begin)
+            for reduced in (np.maximum, np.minimum)
+        )
+        extent = (high / 2 - low / 2).max(axis=1)[owner]
     return (area <= flat) | (size <= 1e-9 * extent)
 
 
@@ -147,6 +152,7 @@ def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
     rows = [np.zeros((0, 3), np.int64)]
     for s in np.unique(size[faces]):
         index = np.flatnonzero(faces & (size == s))
+        index = index[_may_be_double(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)])]
         vertices = np.sort(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)], axis=1)
         proper = (vertices[:, 1:] != vertices[:, :-1]).all(axis=1)
         index, vertices = index[proper], vertices[proper]
@@ -161,6 +167,17 @@ def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
         first = index[order[np.cumsum(count) - count]][inverse]
         rows.append(np.stack([index[twice], number[twice], first[twice]], axis=1))
     return np.concatenate(rows)
+
+
+def _may_be_double(vertices: np.ndarray) -> np.ndarray:
+    """Which rows (k,s) of vertices may have those of another one, in any order, (k,) bool: all that do, and, of many
+    rows, few others. Sums of random numbers tell that, and little is left to be sorted."""
+    n = int(vertices.max(initial=-1)) + 1
+    if vertices.size <= max(FEW_CORNERS, n):
+        return np.ones(len(vertices), bool)
+    number = np.random.default_rng(0).integers(1 << 62, size=n)
+    place = places_in_table(number[vertices.T].sum(axis=0), len(vertices))
+    return np.bincount(place)[place] > 1
 
 
 def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluing:

@@ -12,10 +12,17 @@ from scipy.sparse.csgraph import connected_components
 
 # Nodes of graphs whose components are found without a sparse matrix.
 FEW_NODES = 2000
+# Corners of triangles up to which all their sides are sorted in the time that it takes to leave out those within.
+FEW_CORNERS = 1000
 # Pairs up to which it takes longer to count than to compare them.
 FEW_PAIRS = 8000
 # So many times as many as there are integers the largest may be where they are counted.
 COUNTED = 4
+# Places of a table for each key that is looked up, at least; and what scatters keys over it, 2^64 over the golden mean.
+TABLE = 16
+SCATTER = np.uint64(0x9E3779B97F4A7C15)
+# Triangles that are looked at at once: what is found on the way stays in the cache.
+PART = 1 << 15
 # Of more sides between two places none meet: four are those of two polygons that both have two sides.
 MOST_SIDES = 4
 
@@ -126,8 +133,28 @@ def are_among(keys: np.ndarray, few: np.ndarray) -> np.ndarray:
     """Which of the keys (k,) are among few others (f,), (k,) bool: `np.isin` sorts all of both."""
     if not len(few) or not len(keys):
         return np.zeros(len(keys), bool)
+    if len(few) > max(FEW_PAIRS, len(keys)):
+        few = few[_may_be_among(few, keys)]
+        if not len(few):
+            return np.zeros(len(keys), bool)
     ordered = np.sort(few)
     return ordered[np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)] == keys
+
+
+def _may_be_among(many: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """Which of many integers (f,) share their place in a table with one of the keys (k,), (f,) bool: each that is one
+    of them, and few others, so that most are never sorted."""
+    one, other = places_in_table(many, len(keys)), places_in_table(keys, len(keys))
+    taken = np.zeros(max(int(one.max()), int(other.max())) + 1, bool)
+    taken[other] = True
+    return taken[one]
+
+
+def places_in_table(keys: np.ndarray, count: int) -> np.ndarray:
+    """The place (k,) of each of the keys (k,), integers, in a table for so many: those of neighbours are scattered
+    (Knuth, The art of computer programming 3, section 6.4)."""
+    shift = np.uint64(64 - (TABLE * count).bit_length())
+    return ((keys.astype(np.int64, copy=False).view(np.uint64) * SCATTER) >> shift).astype(np.int64)
 
 
 def runs(ordered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -149,9 +176,10 @@ def _counted(values: np.ndarray, most: int) -> np.ndarray:
     return rows.tocsc().indices
 
 
-def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of the two members of every key (k,) that occurs exactly twice, (p,) and (p,)."""
-    order = order_of_pairs(keys)
+def pair_up(keys: np.ndarray, order: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the two members of every key (k,) that occurs exactly twice, (p,) and (p,); order (k,) : that of
+    `order_of_pairs`, where it is known."""
+    order = order_of_pairs(keys) if order is None else order
     ordered = keys[order]
     alike = np.zeros(len(keys) + 1, dtype=bool)
     np.equal(ordered[1:], ordered[:-1], out=alike[1:-1])
@@ -217,6 +245,18 @@ def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     tail, head = halfedges(triangles)
     boundary = twins(triangles) < 0
     return np.column_stack([tail[boundary], head[boundary]])
+
+
+def inner_vertices(triangles: np.ndarray, n: int) -> np.ndarray:
+    """Which of n vertices (n,) bool are on no boundary of an oriented manifold mesh (m,3): their neighbours after them
+    are those before them. Sums of random numbers tell that, in a third of the memory of twins."""
+    number = np.random.default_rng(0).integers(1 << 62, size=n)
+    balance = np.zeros(n, np.int64)
+    for begin in range(0, len(triangles), PART):
+        tail, head = halfedges(triangles[begin : begin + PART])
+        np.add.at(balance, tail, number[head])
+        np.subtract.at(balance, head, number[tail])
+    return balance == 0
 
 
 def euler_characteristic(n: int, m: int, b: int) -> int:
@@ -365,7 +405,8 @@ def vertices_along_boundary(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     See `boundary_loops`.
     """
-    edges = boundary_edges(triangles)
+    n = int(triangles.max(initial=-1)) + 1
+    edges = boundary_edges(triangles) if triangles.size <= max(FEW_CORNERS, n) else _edges_of_loops(triangles, n)
     if len(edges) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     edges = edges[np.argsort(edges[:, 0], kind="stable")]
@@ -377,6 +418,17 @@ def vertices_along_boundary(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarr
     ahead = _steps_to(following, start, int(size.max()))
     order = np.lexsort((size[label] - ahead, ahead > 0, label))
     return vertices[order], size
+
+
+def _edges_of_loops(triangles: np.ndarray, n: int) -> np.ndarray:
+    """`boundary_edges` (b,2) of an oriented manifold mesh (m,3) of n vertices: both ends of such an edge are on a
+    boundary, and only edges between two of these need to be sorted."""
+    tail, head = halfedges(triangles)
+    inner = inner_vertices(triangles, n)
+    few = np.flatnonzero(~(inner[tail] | inner[head]))
+    tail, head, alone = tail[few], head[few], np.ones(len(few), bool)
+    alone[np.concatenate(pair_up(pair_keys(tail, head)))] = False
+    return np.column_stack([tail[alone], head[alone]])
 
 
 def _steps_to(following: np.ndarray, goals: np.ndarray, most: int) -> np.ndarray:

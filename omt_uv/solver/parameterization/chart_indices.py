@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.density import Target
-from ..analysis.order_of_places import lowest_first, order_of_places
+from ..analysis.order_of_places import lowest_first, order_of_places, order_of_rows
 from ..analysis.symmetry_plane import MirrorImages
 from ..errors import MeshError, PinError
 from ..maps.similarity import fit_similarity
@@ -54,7 +54,7 @@ def in_order_of_places(chart: Chart) -> tuple[Chart, np.ndarray]:
     triangles, turn = lowest_first(place[chart.triangles])
     corners = np.take_along_axis(chart.corners, turn, axis=1)
     polygon = distinct(chart.faces)[1]
-    rows = np.lexsort((*triangles.T[::-1], *_polygon_keys(triangles, polygon)))
+    rows = order_of_rows(*_polygon_keys(triangles, polygon)[::-1], *triangles.T)
     patches = lowest_first(place[chart.patches])[0]
     # What is kept while a large chart is mapped takes half of the memory that it was found in.
     kept = np.int32 if len(rows) > MANY else np.int64

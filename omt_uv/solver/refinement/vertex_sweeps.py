@@ -14,7 +14,7 @@ import numpy as np
 from ..maps.contacts import crossings_on_the_way, loop_edges
 from ..maps.energy import Elements, area_error, elements, energies, squared
 from ..mesh.geometry import KEPT_HATS
-from ..mesh.topology import halfedges, order_of_numbers, runs
+from ..mesh.topology import inner_vertices, order_of_numbers, runs
 from ..progress import Progress, Steps
 
 # Least eigenvalue of a vertex's Hessian over the greatest.
@@ -148,25 +148,13 @@ def _sets(faces: Elements, n: int, whole=False):
 def _stars(F: np.ndarray, n: int, whole=False):
     """Independent sets of vertices, inner or all: vertices (k,); rows, faces (s,) and corners (s,3) of their stars."""
     random = np.random.default_rng(0)
-    inner = np.ones(n, bool) if whole else _inner(F, n)
+    inner = np.ones(n, bool) if whole else inner_vertices(F, n)
     for _ in range(SETS):
         chosen = independent_set(F, np.where(inner, random.permutation(n), -1))
         inner &= ~chosen
         star, corner = stars(F, chosen)
         vertex, row = runs(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0])
         yield vertex, row, star, corner
-
-
-def _inner(F: np.ndarray, n: int) -> np.ndarray:
-    """Which of n vertices (n,) bool are on no boundary of an oriented manifold mesh (m,3): their neighbours after them
-    are those before them. Sums of random numbers tell that, in a third of the memory of twins."""
-    number = np.random.default_rng(0).integers(1 << 62, size=n)
-    balance = np.zeros(n, np.int64)
-    for begin in range(0, len(F), PART):
-        tail, head = halfedges(F[begin : begin + PART])
-        np.add.at(balance, tail, number[head])
-        np.subtract.at(balance, head, number[tail])
-    return balance == 0
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.analysis.order_of_places import lowest_first, order_of_places
+from omt_uv.solver.analysis.order_of_places import lowest_first, order_of_places, order_of_rows
 
 
 def test_the_order_of_a_file_plays_no_part():
@@ -59,3 +59,10 @@ def test_points_that_are_much_farther_away_than_they_are_apart_have_an_order(far
     found = order_of_places(np.column_stack([np.full(90, far), np.full(90, -far), z]), triangles)
     np.testing.assert_array_equal(found, near)
     assert (np.diff(z[found]) >= 0).all()
+
+
+@pytest.mark.parametrize("bits", [(3, 4, 5), (40, 20, 2), (62, 62), (0, 1)])
+def test_the_order_of_rows_is_that_of_their_columns(bits):
+    rng = np.random.default_rng(0)
+    columns = [rng.integers(0, 1 << b, 500) for b in bits]
+    assert (order_of_rows(*columns) == np.lexsort(columns[::-1])).all()

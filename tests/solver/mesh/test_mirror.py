@@ -105,6 +105,22 @@ def test_what_hangs_on_one_side_of_the_plane_has_no_image_but_its_own():
     np.testing.assert_array_equal(np.unique(faces[found.own]), np.arange(18, 24))
 
 
+@pytest.mark.parametrize("kind", ["triangles", "quads", "a vertex used twice"])
+def test_corners_are_in_the_order_of_their_polygons(kind):
+    F = meshes.grid()[1]
+    faces = np.random.default_rng(0).permutation(len(F))
+    if kind == "quads":
+        faces //= 2
+    if kind == "a vertex used twice":
+        F = np.vstack([F, F[:1, [0, 1, 0]]])
+        faces = np.append(faces, len(faces))
+    n = int(F.max()) + 1
+    pairs = np.unique(np.repeat(faces, 3) * n + F.ravel())
+    found = mirror._corners(F, faces, n)
+    np.testing.assert_array_equal(found[0], pairs // n)
+    np.testing.assert_array_equal(found[1], pairs % n)
+
+
 @pytest.mark.parametrize("sides", [3, 4, 8, 9, 12])
 def test_corners_of_polygons_of_any_number_of_sides_find_their_images(sides):
     """A row of polygons of their own, beside one another and beside their images across x = 0."""

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.errors import DuplicateFaceError, EmptyMeshError, NonFiniteError, ZeroAreaFaceError
+from omt_uv.solver.mesh import surface as surfaces
 from omt_uv.solver.mesh.surface import (
     chosen_triangles,
     degenerate_triangles,
@@ -37,6 +38,19 @@ def test_duplicates_are_numbered_among_their_likes():
     assert rows[:, :2].tolist() == [[3, 0], [5, 0], [8, 1], [9, 1], [10, 2]]
     assert (np.sort(twice[rows[:, 0]], axis=1) == np.sort(twice[rows[:, 2]], axis=1)).all()
     assert set(rows[:, 2]) == {3, 5}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_duplicates_of_many_faces_are_those_of_few(seed, monkeypatch):
+    V, F = meshes.grid(30, 30)
+    rng = np.random.default_rng(seed)
+    again = rng.permuted(F[rng.integers(0, len(F), 20)], axis=1)
+    surface = triangle_surface(V, rng.permutation(np.concatenate([F, again])))
+    every = np.ones(len(surface.triangles), bool)
+    found = duplicate_faces(surface, every)
+    monkeypatch.setattr(surfaces, "FEW_CORNERS", surface.triangles.size)
+    expected = duplicate_faces(surface, every)
+    assert len(expected) > 20 and (found == expected).all()
 
 
 def test_polygons_with_a_vertex_used_twice_are_nobody_s_duplicates():

@@ -6,7 +6,9 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from omt_uv.solver.mesh import topology
 from omt_uv.solver.mesh.topology import (
+    FEW_PAIRS,
     are_among,
     boundary_edges,
     boundary_loops,
@@ -15,6 +17,7 @@ from omt_uv.solver.mesh.topology import (
     first_places,
     graph_components,
     halfedges,
+    inner_vertices,
     next_halfedge,
     on_boundary,
     pair_keys,
@@ -129,6 +132,33 @@ def test_keys_among_few_are_those_of_numpy(few):
     keys, few = np.random.default_rng(0).integers(0, 10, 200), np.array(few, np.int64)
     assert (are_among(keys, few) == np.isin(keys, few)).all()
     assert len(are_among(keys[:0], few)) == 0
+
+
+@pytest.mark.parametrize("bound", [300, 1 << 62])
+def test_keys_among_many_are_those_of_numpy_though_most_of_these_are_not_sorted(bound):
+    rng = np.random.default_rng(0)
+    many = rng.integers(-bound, bound, 3 * FEW_PAIRS)
+    keys = np.concatenate([many[::50], rng.integers(-bound, bound, 100)])
+    assert (are_among(keys, many) == np.isin(keys, many)).all()
+    assert not are_among(np.full(3, bound), many).any()
+
+
+@pytest.mark.parametrize("holes", [0, 5])
+def test_inner_vertices_are_those_between_twins(holes):
+    V, F = meshes.head(12)
+    F = np.delete(F, np.random.default_rng(0).permutation(len(F))[:holes], axis=0)
+    tail, head = halfedges(F)
+    expected = np.ones(len(V), bool)
+    expected[tail[twins(F) < 0]] = expected[head[twins(F) < 0]] = False
+    np.testing.assert_array_equal(inner_vertices(F, len(V)), expected)
+
+
+@pytest.mark.parametrize("name", [*OPEN, *CLOSED])
+def test_edges_of_loops_are_those_of_all_boundaries(name):
+    """Of large meshes nothing within is sorted for them."""
+    V, F = (OPEN | CLOSED)[name]
+    F = np.concatenate([F, F[::2] + len(V)]) if name == "grid" else F
+    np.testing.assert_array_equal(topology._edges_of_loops(F, int(F.max()) + 1), boundary_edges(F))
 
 
 def test_components_of_many_nodes_do_not_mind_edges_that_are_there_twice_or_lead_nowhere():

@@ -9,7 +9,7 @@ from omt_uv.solver.maps.energy import area_error, elements, energies, energy
 from omt_uv.solver.maps.tutte import arc_length_parameters, tutte
 from omt_uv.solver.mesh import geometry
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.mesh.topology import boundary_loops, halfedges, twins
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import vertex_sweeps as smoothing
 
@@ -145,13 +145,3 @@ def test_of_many_triangles_stars_and_gradients_are_taken_as_they_are_asked_for(c
     np.testing.assert_array_equal(many.gradient_at(some), faces.gradient[some])
     for smooth, edge in zip(expected, (None, loop), strict=True):
         np.testing.assert_array_equal(drain(smoothing.smoothed(many, w, WEIGHT, 3, edge)), smooth)
-
-
-@pytest.mark.parametrize("holes", [0, 5])
-def test_inner_vertices_are_those_between_twins(holes):
-    V, F = meshes.head(12)
-    F = np.delete(F, np.random.default_rng(0).permutation(len(F))[:holes], axis=0)
-    tail, head = halfedges(F)
-    expected = np.ones(len(V), bool)
-    expected[tail[twins(F) < 0]] = expected[head[twins(F) < 0]] = False
-    np.testing.assert_array_equal(smoothing._inner(F, len(V)), expected)
