@@ -15,7 +15,7 @@ import numpy as np
 
 from ..maps.energy import Elements, elements
 from ..mesh.geometry import complex_cross, cross2, cross3, face_areas, lengths, of_corners
-from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs
+from ..mesh.topology import are_among, boundary_loops, expand, halfedges, order_of_pairs, pair_keys, runs
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
 
@@ -204,22 +204,22 @@ def _simple(F, v, after, before, into, good):
     that is there already, or that another one makes, too."""
     row = runs(v)[1]
     vertex = np.flatnonzero(np.diff(row, prepend=-1))
-    ends, of = np.concatenate([after[good], before[good]]), np.concatenate([row[good], row[good]])
-    others, goal = np.concatenate([before[good], after[good]]), into[vertex[of]]
-    # Those in the faces of the edge that goes are joined to both of its ends.
-    known = np.isin((of << 32) + ends, ((of << 32) + others)[ends == goal]) | (ends == goal)
-    ends, of = ends[~known], of[~known]
-    made = pair_keys(ends, into[vertex[of]])
-    # Every one of them is in two faces of its star, or at the boundary in one.
-    order = np.lexsort((of, made))
+    goal, fails = into[vertex], np.zeros(len(vertex), bool)
+    # Those in the two faces of the edge that goes, one on each side, are joined to both of its ends.
+    beside = np.full((2, len(vertex)), -1)
+    for known, end, other in zip(beside, (after, before), (before, after), strict=True):
+        at = np.flatnonzero(end == into)
+        known[row[at]] = other[at]
+    ends, of = np.column_stack([after[good], before[good]]).ravel(), np.repeat(row[good], 2)
+    new = (ends != goal[of]) & (ends != beside[0, of]) & (ends != beside[1, of])
+    ends, of = ends[new], of[new]
+    made = pair_keys(ends, goal[of])
+    # Every one of them is in two faces of its star, or at the boundary in one; the order is a stable one.
+    order = order_of_pairs(made)
     made, of = made[order], of[order]
     first = np.diff(made, prepend=-1) != 0
     owner = of[np.flatnonzero(first)][np.cumsum(first) - 1]
-    bad = of != owner
-    edges = np.sort(pair_keys(*halfedges(F)))
-    bad |= edges[np.minimum(np.searchsorted(edges, made), len(edges) - 1)] == made
-    fails = np.zeros(len(vertex), bool)
-    fails[of[bad]] = True
+    fails[of[(of != owner) | are_among(made, pair_keys(*halfedges(F)))]] = True
     return ~fails[row]
 
 
@@ -247,19 +247,24 @@ def _best_collapses(V, flat, v, after, before, ahead):
     candidate, other = expand(size[row])
     other = other + first[row[candidate]]
     into = after[candidate]
-    gone = (after[other] == into) | (before[other] == into)
+    # Two faces of every star of five or six go, of which nothing is asked.
+    stays = (after[other] != into) & (before[other] != into)
+    candidate, other = candidate[stays], other[stays]
+    left = np.bincount(candidate, minlength=len(v))
+    begin = (np.cumsum(left) - left)[left > 0]
     normal, old = _normals(V, np.column_stack([v, after, before]))
     new_normal, shape = _normals_of(*_gathered(V, after, before, candidate, other))
     whole = _sums(row, normal)
     along = [x * y[row[candidate]] for x, y in zip(new_normal, whole.T.copy(), strict=True)]
     turned = along[0] + along[1] + along[2] <= 0
-    begin = np.cumsum(size[row]) - size[row]
-    score = np.minimum.reduceat(np.where(gone, np.inf, shape), begin)
     if flat is not None:
         turned |= _flat_shape(*_gathered(flat, after, before, candidate, other)) < LEAST_FLAT_SHAPE
-    bad = np.logical_or.reduceat(~gone & turned, begin)
+    # Those that turn over have less than any shape.
+    score = np.full(len(v), np.inf)
+    score[left > 0] = np.minimum.reduceat(np.where(turned, -1.0, shape), begin)
+    bad = ~((score >= 0) & (score < np.inf))
     # Nor does an inner vertex go to the boundary: edges across would cut off parts that have no room in a domain.
-    bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0)) | ~np.isfinite(score)
+    bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0))
     bad |= score < np.minimum(LEAST_SHAPE, np.minimum.reduceat(old, first)[row] / 2)
     # Coarse marks, so that rounding does not choose among equals.
     mark = np.where(bad, -1, np.floor(np.minimum(score, 1) * 20 + 0.37).astype(np.int64))
@@ -283,8 +288,10 @@ def _places(V, flat, vertex, row, new, ahead, normal):
     total = weights.sum(1)[:, None]
     # Of a triangle without area: outside of it.
     weights = np.divide(weights, total, out=np.tile([-1.0, 1.0, 1.0], (len(total), 1)), where=total != 0)
-    order = np.lexsort((-of_corners(np.minimum, weights), row))
-    around = order[np.searchsorted(row[order], np.arange(len(vertex)))]
+    # The first of those it is deepest in.
+    begin, depth = np.searchsorted(row, np.arange(len(vertex))), of_corners(np.minimum, weights)
+    deepest = np.flatnonzero(depth == np.maximum.reduceat(depth, begin)[row])
+    around = deepest[np.searchsorted(row[deepest], np.arange(len(vertex)))]
     corner, share = new[around], weights[around]
     back = np.full(len(V), -1)
     boundary = np.flatnonzero(ahead >= 0)
