@@ -44,13 +44,32 @@ def test_sweeps_end_at_the_first_map_that_has_its_areas(chart):
     maps = [drain(smoothing.smoothed(faces, w, WEIGHT, k, goal=NEVER)) for k in range(1, 7)]
     errors = [area_error(faces, one) for one in maps]
     assert (np.diff(errors) < 0).all()
+    before = area_error(faces, w)
     for k, error in enumerate(errors):
         goal = error * (1 + 1e-9)
+        if before <= smoothing.NEARLY * goal:
+            continue
         steps = list(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=goal))
         assert len(steps) == k + 1
         np.testing.assert_array_equal(drain(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=goal)), maps[k])
     far = drain(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=errors[-1] / 2))
     np.testing.assert_array_equal(far, maps[-1])
+
+
+def test_a_map_with_its_areas_stays_and_one_that_has_nearly_takes_a_part_of_a_sweep(chart):
+    faces, w, _ = chart
+    before, swept = area_error(faces, w), drain(smoothing.smoothed(faces, w, WEIGHT, 1, goal=NEVER))
+    once = area_error(faces, swept)
+    assert list(smoothing.smoothed(faces, w, WEIGHT, 6, goal=before)) == []
+    np.testing.assert_array_equal(drain(smoothing.smoothed(faces, w, WEIGHT, 6, goal=before)), w)
+    for share in (0.1, 0.5, 0.9):
+        goal = max(before - share * (before - once), before / smoothing.NEARLY)
+        found = drain(smoothing.smoothed(faces, w, WEIGHT, 6, goal=goal))
+        moved = found != w
+        assert 0 < moved.sum() < (swept != w).sum()
+        # What has moved went as it does in a whole sweep.
+        np.testing.assert_array_equal(found[moved], swept[moved])
+        assert area_error(faces, found) <= goal and (faces.areas(found) > 0).all()
 
 
 def test_sweeps_to_an_area_error_go_beyond_the_least_energy_but_for_the_first(chart):
