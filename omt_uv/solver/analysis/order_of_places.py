@@ -81,7 +81,8 @@ def _centred(points: np.ndarray) -> np.ndarray | None:
 def _axes(p: np.ndarray) -> np.ndarray | None:
     """`own_axes` of centred points (n,3)."""
     values, axes = np.linalg.eigh(p.T @ p / len(p))
-    skew = ((p @ axes) ** 3).mean(axis=0)
+    along = p @ axes
+    skew = (along * along * along).mean(axis=0)
     if np.diff(values).min() < DISTINCT * values[-1] or np.sort(np.abs(skew))[1] < DISTINCT * values[-1] ** 1.5:
         return None
     axes = axes * np.where(skew < 0, -1, 1)

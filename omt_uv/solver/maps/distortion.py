@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from ..mesh.geometry import bounds, cross2, cross3, extents, face_areas, lengths, part_by_part
+from ..mesh.geometry import as_complex, bounds, cross2, cross3, extents, face_areas, lengths, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quads
 from ..mesh.topology import distinct, graph_components, halfedges, order_of_pairs, pair_keys
 from .energy import AT_ONCE
@@ -337,8 +337,8 @@ def uv_charts(F, uv):
 
 def _is_one_to_a_vertex(F, uv) -> bool:
     """Whether all corners of a vertex have the same UVs (m,3,2)."""
-    flat, corner = F.ravel(), uv.reshape(-1, 2)
-    of = np.empty((int(flat.max(initial=-1)) + 1, 2))
+    flat, corner = F.ravel(), as_complex(uv.reshape(-1, 2))
+    of = np.empty(int(flat.max(initial=-1)) + 1, complex)
     of[flat] = corner
     return bool((of[flat] == corner).all())
 

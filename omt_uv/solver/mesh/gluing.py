@@ -54,6 +54,13 @@ class Gluing:
         found.flags.writeable = False
         return found
 
+    @cached_property
+    def parts(self) -> np.ndarray:
+        """See `components`, for which a cut asks, and what makes charts of what it leaves."""
+        found = graph_components(self.first // 3, self.second // 3, len(self.triangles))[1]
+        found.flags.writeable = False
+        return found
+
     def without(self, gone: np.ndarray) -> Gluing:
         """The same triangles with the pairs `gone` (p,) bool cut open."""
         return replace(self, first=self.first[~gone], second=self.second[~gone])
@@ -93,7 +100,7 @@ def corner_classes(gluing: Gluing) -> np.ndarray:
 
 def components(gluing: Gluing) -> np.ndarray:
     """Component (m,) of every triangle."""
-    return graph_components(gluing.first // 3, gluing.second // 3, len(gluing.triangles))[1]
+    return gluing.parts
 
 
 def orientations(gluing: Gluing, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -24,6 +24,7 @@ from .surface import (
     is_seam,
     side_ends,
     used_twice,
+    using_twice,
 )
 from .topology import (
     expand,
@@ -78,7 +79,7 @@ def repaired_gluing(surface: Surface, faces: np.ndarray, triangles: np.ndarray, 
     gluing = polygon_gluing(triangles, owner, surface.corner_vertex, surface.face_start)
     layer, warnings = _layers(surface, faces)
     joined, torn = _pair_sides(surface, gluing, layer)
-    around = _perimeters(surface)
+    around = np.zeros(0) if joined.side.all() else _perimeters(surface)
     while len(folded := _folded_faces(joined, layer, around)):
         layer[folded] = -1
         joined, torn = _pair_sides(surface, gluing, layer)
@@ -109,9 +110,7 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
             f"{plural(copies, '1 face', '{} faces')} with the same vertices as another, mapped apart; "
             f"delete what is double, or {MERGE}"
         )
-    polygon = np.repeat(np.arange(f), np.diff(surface.face_start))
-    key = np.sort((polygon << 32) | surface.corner_vertex)
-    repeating = np.unique(key[1:][key[1:] == key[:-1]] >> 32)
+    repeating = using_twice(surface)
     layer[repeating] = -1
     repeating = repeating[faces[repeating]]
     if len(repeating):

@@ -246,6 +246,17 @@ def used_twice(surface: Surface, faces: np.ndarray, label: np.ndarray) -> np.nda
     return corners[np.bincount(pairs)[pairs] > 1]
 
 
+def using_twice(surface: Surface) -> np.ndarray:
+    """The polygons (k,) with a vertex used twice, ascending."""
+    vertex, size = surface.corner_vertex, np.diff(surface.face_start)
+    polygon = np.repeat(np.arange(len(size)), size)
+    # In a triangle they follow each other: only what has more sides is sorted.
+    sides = size[polygon]
+    beside = polygon[(vertex == vertex[next_corners(surface.face_start)]) & (sides == 3)]
+    key = np.sort((polygon << 32 | vertex)[sides != 3])
+    return np.union1d(beside, key[1:][key[1:] == key[:-1]] >> 32)
+
+
 def turned_surface(surface: Surface, axes: np.ndarray) -> Surface:
     """The surface with its positions multiplied by a rotation (3,3)."""
     return replace(surface, positions=turned_by(surface.positions, axes))

@@ -13,6 +13,7 @@ from omt_uv.solver.mesh.surface import (
     is_seam,
     strict_gluing,
     triangle_surface,
+    using_twice,
 )
 from omt_uv.solver.mesh.topology import pair_keys
 
@@ -58,6 +59,14 @@ def test_polygons_with_a_vertex_used_twice_are_nobody_s_duplicates():
     a, b = F[0, :2]
     surface = triangle_surface(V, np.vstack([F, [[a, b, a], [b, a, a]]]))
     assert len(duplicate_faces(surface, np.ones(len(F) + 2, bool))) == 0
+
+
+def test_polygons_with_a_vertex_used_twice_are_those_of_their_corners():
+    rng = np.random.default_rng(0)
+    polygons = [rng.integers(0, 9, size).tolist() for size in rng.integers(3, 7, 200)]
+    twice = [k for k, corners in enumerate(polygons) if len(set(corners)) < len(corners)]
+    assert using_twice(meshes.polygon_surface(rng.random((9, 3)), polygons)).tolist() == twice
+    assert 50 < len(twice) < 200
 
 
 def test_seams_know_no_direction():
