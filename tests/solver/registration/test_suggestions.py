@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import meshes
 import numpy as np
 import pytest
 from sphere_shapes import blob
 
 from omt_uv.solver.errors import EmptyMeshError, NonFiniteError
+from omt_uv.solver.registration import suggestions
 from omt_uv.solver.registration.suggestions import suggest_landmarks
 
 BODY, ROUND = blob(3, seed=1), blob(1, seed=2)
@@ -34,3 +36,16 @@ def test_what_is_no_surface_is_refused(side):
         with pytest.raises(error) as raised:
             suggest_landmarks(*((wrong, BODY) if side == 0 else (BODY, wrong)))
     assert raised.value.elements.tolist() == [F[7, 1]]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_no_place_that_stands_out_has_a_neighbour_that_does_more(turned):
+    """Along a boundary, too, where an edge has a face on one side alone, whichever way round."""
+    V, F = meshes.grid(6, 5)
+    F = F[:, ::-1] if turned else F
+    value = np.random.default_rng(0).random(len(V))
+    ends = np.concatenate([F[:, [k, (k + 1) % 3]] for k in range(3)])
+    highest = [value[np.append(ends[ends[:, 0] == v, 1], ends[ends[:, 1] == v, 0])].max() for v in range(len(V))]
+    # Far enough apart for all of them to be taken.
+    found = suggestions._peaks(value, 10 * V, F)
+    assert sorted(found.tolist()) == np.flatnonzero(value >= highest).tolist()

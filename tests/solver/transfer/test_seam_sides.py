@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import meshes
 import numpy as np
+import pytest
 
 from omt_uv.solver.mesh.cut_mesh import cut_open, on_seam
 from omt_uv.solver.mesh.topology import boundary_edges
@@ -41,6 +42,17 @@ def test_vertices_vouch_for_those_on_their_side_only():
     far = np.abs(V[:, 0] - 0.5) > 0.1
     np.testing.assert_array_equal(found[far], np.flatnonzero(far))
     np.testing.assert_array_equal(np.sign(V[found, 0] - 0.5), np.sign(V[:, 0] - 0.5))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("turned", [False, True])
+def test_neighbours_along_a_boundary_vouch_for_one_another_whichever_way_its_edges_go(turned, side):
+    """One triangle, with a corner so near to the seam that it asks, and one that is far from it."""
+    _, _, _, mesh = cut_square()
+    lifted = np.array([[0.5, 0.4, 0], [0.5 + 0.02 * side, 0.5, 0], [0.5 + 0.4 * side, 0.5, 0]])
+    free = np.array([False, True, True])
+    triangle = np.array([[0, 2, 1]] if turned else [[0, 1, 2]])
+    assert reference_vertices(mesh, triangle, free, lifted, 0.125).tolist() == [0, 2, 2]
 
 
 def test_faces_are_found_on_the_side_from_which_the_walk_starts():
