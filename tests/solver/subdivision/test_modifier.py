@@ -45,6 +45,21 @@ def test_creases_of_the_surface_are_those_of_its_uvs():
     assert abs(fine.corners - smooth.corners).max() > 0.1
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_creases_have_their_sharpness_in_whatever_order_they_come(seed):
+    """And whichever of their ends comes first."""
+    rng, surface = np.random.default_rng(seed), box()
+    ends = np.array([[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [1, 5]])
+    sharpness = np.array([0.3, 0.7, 1.2, 1.9, 2.4, 3.0])
+    order = rng.permutation(len(ends))
+    turned = np.where(rng.random(len(ends))[:, None] < 0.5, ends[order, ::-1], ends[order])
+    plain = SubdivisionModifier(2, "SMOOTH_ALL", ends=ends, sharpness=sharpness)
+    other = SubdivisionModifier(2, "SMOOTH_ALL", ends=turned, sharpness=sharpness[order])
+    for one, two in ((uncut(surface, plain), uncut(surface, other)),
+                     (subdivided_surface(surface, plain, 10**6).subdivision, uncut(surface, other))):  # fmt: skip
+        assert abs(one.matrix - two.matrix).max() < 1e-12
+
+
 @pytest.mark.parametrize(("mode", "straight"), [("PRESERVE_BOUNDARIES", True), ("SMOOTH_ALL", False)])
 def test_islands_keep_their_outline_where_the_modifier_says_so(mode, straight):
     # Every polygon is an island: four corners of its own.
