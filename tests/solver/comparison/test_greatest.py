@@ -73,6 +73,21 @@ def test_no_sample_is_above_the_bound_and_many_come_near(seed):
     assert found.distance <= found.bound <= (1 + 1e-9) * (1 + 1e-3) * found.distance
 
 
+@pytest.mark.parametrize("at_once", [4, 20_000])
+def test_what_waits_until_others_are_cut_is_not_forgotten(at_once, monkeypatch):
+    """A large triangle on many small ones has the highest bound for long, and lies on them; the peak is elsewhere."""
+    W, G = meshes.grid(4, 4)
+    plate, top = np.column_stack([9 * W[:, :2] + [3, 0], np.zeros(len(W))]), np.array([0.61, 0.23, -0.4])
+    sides = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    target = np.vstack([SQUARE[0], top, plate]), np.concatenate([sides, G + 5])
+    source = np.vstack([SQUARE[0], [[4, 1, 0], [11, 2, 0], [5, 8, 0]]]), np.concatenate([SQUARE[1], [[4, 5, 6]]])
+    monkeypatch.setattr(greatest, "MOST_AT_ONCE", at_once)
+    found = searched(source, target)
+    alone = searched(SQUARE, (target[0][:5], sides))
+    assert found.distance == pytest.approx(alone.distance, rel=2e-3) and alone.distance <= found.bound
+    assert found.distance > 0.1 and found.bound <= (1 + 1e-9) * (1 + 1e-3) * found.distance
+
+
 def test_a_peak_between_all_vertices_is_found():
     """Above a cone with its top within a face, no vertex is farthest."""
     top = np.array([0.61, 0.23, -0.4])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise, product
+from types import SimpleNamespace
 
 import meshes
 import numpy as np
@@ -353,6 +354,23 @@ def test_paths_and_depths_are_shortest(coarse):
     assert np.isinf(depth[np.setdiff1d(np.arange(len(depth)), np.append(path, start))]).all()
     assert graph.vertices_of(steps).tolist() == sorted(set(path) - set(start.tolist()))
     assert graph.is_open(steps)
+
+
+@pytest.mark.parametrize("off", [1e-12, -1e-12, 1e-8, -1e-8, 1e-3, -1e-3])
+def test_of_ends_that_are_worth_the_same_the_farthest_is_taken_and_rounding_does_not_choose(off, monkeypatch):
+    """A row of vertices from a tip to the cut, where a path may end at the first three."""
+    cost = np.arange(6.0)[::-1]
+    graph = SimpleNamespace(
+        boundary=cost == 0, ends=np.zeros((0, 2), int), image=np.arange(6), paths_from=lambda _: (cost, np.arange(1, 7))
+    )
+    monkeypatch.setattr(growth, "_tips", lambda *_: np.array([0]))
+    monkeypatch.setattr(growth, "path_to", lambda before, tip: np.arange(6))
+    # What a cut from each on lowers the spread by, that nearest to the cut first: the second and third are worth more.
+    falls = np.array([0.1, 0.2, 3 * (1 + 2 * off), 4 * (1 + off), 5])
+    task = SimpleNamespace(graph=graph, tip_factor=np.ones(6))
+    cut = SimpleNamespace(steps=np.zeros(0, int), spread=9.0)
+    (arc,) = growth._arcs(task, cut, SimpleNamespace(spread=9.0, falls=lambda _: falls))
+    assert arc.path[0] == (2 if off == 1e-3 else 0)
 
 
 def test_arcs_are_worth_what_the_spread_falls_for_their_cost(coarse):

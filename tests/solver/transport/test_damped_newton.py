@@ -128,3 +128,30 @@ def test_what_is_told_of_a_solution_is_what_a_closer_look_says(off, exact_from, 
     np.testing.assert_allclose(found.cells.area, area, rtol=1e-14)
     assert found.residual == pytest.approx(np.max(np.abs(area - MASS) / MASS), rel=1e-6, abs=1e-15)
     assert found.residual <= tolerance and dual.looks >= 1
+
+
+@pytest.mark.parametrize("growth", [1.0, 2.0, 64.0])
+@pytest.mark.parametrize("first", [1.0, 0.25, 0.01])
+def test_no_step_goes_beyond_the_whole_of_the_direction(growth, first):
+    """Newton's direction is right to first order; what a step grows by is for those that were shortened."""
+    dual, shares, at = SoftMax(), [], [np.zeros(4), np.zeros(4)]
+    dual.growth, dual.first_step = growth, lambda *_: first
+    own_near, own_direction = dual.near, dual.direction
+
+    def direction(cells, mass):
+        at[:] = [np.log(cells.area), own_direction(cells, mass)]
+        return at[1]
+
+    def near(site_weights, cells):
+        moved, whole = (x - x.mean() for x in (site_weights - at[0], at[1]))
+        if (size := float(whole @ whole)) > 0:
+            shares.append(float(moved @ whole) / size)
+        return own_near(site_weights, cells)
+
+    dual.near, dual.direction = near, direction
+    if growth == 1.0 and first < 1:
+        with pytest.raises(TransportError):
+            run(dual, max_steps=30)
+    else:
+        np.testing.assert_allclose(run(dual).cells.area, MASS, rtol=5e-7)
+    assert shares and min(shares) > 0 and max(shares) <= 1 + 1e-6
