@@ -71,6 +71,18 @@ def test_walls_of_a_mesh_are_spread_over_it_and_look_out():
         mesh_domain(V * 0, SIDES, 10)
 
 
+@pytest.mark.parametrize("where", [0, 3, 12])
+def test_faces_without_area_are_no_walls_wherever_they_stand(where):
+    """Samples have the normals of the faces that they lie on."""
+    V = CUBE * [4, 2, 1]
+    found, plain = (
+        mesh_domain(V, np.insert(SIDES, where, [[0, 1, 1], [2, 2, 2]], axis=0), 60),
+        mesh_domain(V, SIDES, 60),
+    )
+    np.testing.assert_array_equal(found.points, plain.points)
+    np.testing.assert_array_equal(found.normals, plain.normals)
+
+
 def test_bad_handles_are_named_whatever_is_wrong():
     P = np.zeros((2, 3))
     good = FlowHandle(P, P + 1)

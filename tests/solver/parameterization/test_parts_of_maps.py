@@ -15,7 +15,7 @@ from omt_uv.solver.analysis.straight_paths import TURN
 from omt_uv.solver.cutting import component_order
 from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
-from omt_uv.solver.errors import MeshError, PinError
+from omt_uv.solver.errors import DensityError, MeshError, PinError
 from omt_uv.solver.mesh.charts import Chart, part_of_chart
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -1341,6 +1341,10 @@ def test_targets_of_charts_stand_side_by_side():
     assert found["density"].tolist() == [2, 3, 4] and found["region"] is None
     found = small_charts._side_by_side([Target(np.ones(2), np.array([0.1, 0.2])), Target(np.ones(1), np.array([0.3]))])
     assert found["region"].tolist() == [0.1, 0.2, 0.3]
+    for wrong in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(DensityError) as raised:
+            small_charts._side_by_side([Target(np.ones(2), None), None, Target(np.array([3.0, wrong]), None)])
+        assert raised.value.elements.tolist() == [3]
 
 
 def test_maps_of_many_charts_are_placed_about_their_middles_with_their_areas():

@@ -8,7 +8,7 @@ import pytest
 
 from omt_uv.solver.mesh.topology import pair_keys
 from omt_uv.solver.remeshing.initial import arc_network
-from omt_uv.solver.remeshing.initial.arc_network import chart_boundary, find_arcs, sample_arcs
+from omt_uv.solver.remeshing.initial.arc_network import Arc, chart_boundary, find_arcs, sample_arcs
 from omt_uv.solver.remeshing.initial.component_maps import RemeshSource
 
 NONE = np.zeros(0, np.int64)
@@ -83,6 +83,22 @@ def test_a_square_has_its_corners():
     assert samples.fixed.all() and len(samples.points) == 16
     assert len(sample_arcs(V, network.arcs, np.full(len(V), 0.26), longer=2).points) == 17
     assert len(sample_arcs(V, network.arcs, np.full(len(V), 0.26), line_spacing=2.0).points) == 8
+
+
+@pytest.mark.parametrize("kept", [(), (0,), (1,), (0, 2), (0, 1, 2)])
+def test_places_where_arcs_meet_stay_just_where_one_of_them_does(kept):
+    """Three arcs in a row, from vertex to vertex of a line."""
+    V = np.column_stack([np.arange(10.0), np.zeros(10), np.zeros(10)])
+    arcs = [Arc(np.arange(3 * k, 3 * k + 4), k in kept) for k in range(3)]
+    samples = sample_arcs(V, arcs, np.full(10, 1.0))
+    ends = {
+        round(float(samples.points[samples.along[k][j]][0])): samples.along[k][j] for k in range(3) for j in (0, -1)
+    }
+    assert ends.keys() == {0, 3, 6, 9}
+    for place, sample in ends.items():
+        assert samples.fixed[sample] == any(place in (3 * k, 3 * k + 3) for k in kept)
+    for k in range(3):
+        assert (samples.fixed[samples.along[k][1:-1]] == (k in kept)).all()
 
 
 def test_samples_around_a_chart_come_in_order_of_its_loop():
