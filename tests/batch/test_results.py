@@ -39,6 +39,14 @@ def test_no_name_is_a_formula_in_a_table(package, first):
     assert read["seconds"] == "-2.5"
 
 
+@pytest.mark.parametrize("end", [" ", "\t", "\r", "\n", "\r\n", "\x0b", ",", "\xa0"])
+def test_a_name_keeps_its_blanks_at_both_ends(package, end):
+    """Of the last column as well, where the line ends."""
+    tables = package("batch.tables")
+    text = tables.csv_lines([["x", f"{end}a{end}"], [f"{end}b{end}"]])
+    assert list(csv.reader(io.StringIO(text, newline=""))) == [["x", f"{end}a{end}"], [f"{end}b{end}"]]
+
+
 @pytest.mark.parametrize("inside", ["\r", "\n", "\r\n", ",", '"'])
 def test_a_name_with_the_end_of_a_line_in_it_is_one_row(package, inside):
     tables = package("batch.tables")

@@ -408,3 +408,18 @@ def test_objects_stand_where_they_stood_also_next_to_the_axes(package, tmp_path,
     found = np.array([again.matrix_world @ v.co for v in again.data.vertices])
     order = [np.lexsort(np.round(x, 4).T) for x in (points, found)]
     np.testing.assert_allclose(found[order[1]], points[order[0]], atol=2e-5)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_an_fbx_of_what_stands_along_the_axes_gives_it_back_along_these(package, tmp_path, axis, turns):
+    """Its reader turns to other axes and back, and rounds; what is whole is rounded to where it was."""
+    scenes.open_empty()
+    obj = scenes.bump(2, 2, name="A")
+    obj.rotation_euler[axis], obj.location = turns * np.pi / 2, (1.0, -2.0, 3.0)
+    bpy.context.view_layer.update()
+    before = np.array(obj.matrix_world).round()
+    package("files.export").export(tmp_path / "made.fbx", ".fbx", [obj], False)
+    (again,) = package("files.meshes").load(tmp_path / "made.fbx")
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(np.array(again.matrix_world), before, atol=1e-6)

@@ -227,6 +227,9 @@ def test_packed_pictures_keep_their_pixels(package, tmp_path, alpha, floats):
     made = images.packed_image("made", pixels, like)
     made.use_fake_user = True
     name = made.name
+    # What says that colours are multiplied by alpha, or are not, says it of the pixels that there are.
+    kinds = {"STRAIGHT": "PREMUL"} if floats else {"PREMUL": "STRAIGHT"}
+    assert made.alpha_mode == kinds.get(alpha, alpha)
     assert np.abs(images.pixels_of(made) - pixels).max() < (1e-6 if floats else 0.003)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))

@@ -162,6 +162,20 @@ def test_positions_that_are_whole_numbers_are_found_and_kept(kind, normal):
     assert (uv[33:] == (np.arange(16).reshape(8, 2) % 2)[before[33:]]).all()
 
 
+@pytest.mark.parametrize("kind", ["<i2", "<u2", "|i1", "|u1"])
+@pytest.mark.parametrize("normal", [True, False])
+def test_shares_of_the_greatest_number_are_from_minus_one_or_nothing_to_one(kind, normal):
+    """The least number with a sign is one further off than the greatest, and means no more than minus one."""
+    limits = np.iinfo(kind)
+    values = np.array([[limits.min, limits.max], [limits.min // 2, limits.max // 2], [0, 1]]).astype(kind)
+    change = GlbChange(glb_data.read(mesh_bytes.glb_bytes()))
+    index = change.replace(None, values, False, {"type": "VEC2"} | ({"normalized": True} if normal else {}), 34962)
+    found = glb_data.floats(change.result(), index)
+    assert found.dtype == np.float32 and found.shape == values.shape
+    expected = np.maximum(values / float(limits.max), -1) if normal else values
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
 def test_an_obj_keeps_comments_at_its_words_and_uvs_that_are_none():
     data = mesh_bytes.obj_bytes().replace(b"f 2 4 8 6", b"f 2 4 8 6/1#glued 9/9\r\nvt nan\r\nvt x y\r\nvt")
     new = obj.put(data, [mesh_bytes.imported(FACES, mesh_bytes.spread(24))])[0]
