@@ -207,3 +207,23 @@ def test_a_wrap_is_a_key_in_the_place_of_the_target(package, objects, value):
     np.testing.assert_allclose(found, place @ there[:3, :3].T + there[:3, 3], atol=1e-5)
     assert block.value == pytest.approx(value) and source.active_shape_key == block
     assert [b.name for b in source.data.shape_keys.key_blocks] == ["Basis", "Wrapped"]
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_no_key_that_is_carried_takes_the_place_of_the_basis(package, objects, there):
+    """Though it may be called as that is: the shape that others are relative to stays as it was."""
+    kinds = package("pipelines.attributes")
+    rng = np.random.default_rng(5)
+    keys = tuple(kinds.ShapeKey(name, rng.random((9, 3)) * (k > 0), 0, {"value": 0.5})
+                 for k, name in enumerate(("First", "Basis", "More")))  # fmt: skip
+    obj, attributes = carried(package, keys=keys)
+    if there:
+        obj.shape_key_add(name="Basis", from_mix=False)
+    base = np.array([v.co[:] for v in obj.data.vertices])
+    objects.write_onto(obj, objects.Carried(None, attributes, np.eye(3), (), ()), attributes, {"shape_keys"})
+    blocks = obj.data.shape_keys.key_blocks
+    found = [np.array([point.co[:] for point in block.data]) for block in blocks]
+    assert len(found) == 3
+    for place, key in zip(found, keys, strict=True):
+        np.testing.assert_allclose(place, base + key.offsets, atol=1e-6)
+    assert all(block.relative_key == blocks[0] for block in blocks)

@@ -54,14 +54,17 @@ def test_three_landmarks_of_one_name_turn_a_body_and_fewer_do_not(monkeypatch, c
 
     def registered(positions, mine, theirs):
         asked.append((mine, theirs))
-        return steps(SimpleNamespace(positions=positions))
+        return steps(SimpleNamespace(positions=positions[:, [1, 2, 0]]))
 
     bodies = iter([one, other])
     monkeypatch.setattr(volume, "_mapped", lambda body, domain, settings: steps((body, next(bodies))))
     monkeypatch.setattr(volume, "registered", registered)
     monkeypatch.setattr(volume, "into_body", lambda first, second, placed: steps(first))
-    monkeypatch.setattr(volume, "TetLocation", lambda *_: SimpleNamespace(values=lambda *given: given[0]))
-    drain(mapped_volume(VolumeBody("one", V, F, first), VolumeSettings("body"), VolumeBody("other", V, F, second)))
+    monkeypatch.setattr(volume, "TetLocation", lambda *_: SimpleNamespace(values=lambda _points, places: places))
+    given = VolumeBody("one", V, F, first), VolumeSettings("body"), VolumeBody("other", V, F, second)
+    found = drain(mapped_volume(*given))
+    # Places in the ball are those of the ball as it was turned.
+    np.testing.assert_array_equal(found.ball, V[:, [1, 2, 0]] if count >= 3 else V)
     assert len(asked) == (count >= 3)
     for mine, theirs in asked:
         np.testing.assert_allclose(mine, [(V[k] + V[k + 7]) / 2 for k in range(count)])
