@@ -83,3 +83,10 @@ def test_what_names_a_button_has_it():
     # Each of them is there for something.
     actions = {action_advised(text) for text in ADVICE} | {action_for(kind("A cause")) for kind in REMEDIES}
     assert {action for action, _, _ in ACTIONS} - {"APPLY_LEVEL", "CUT_FURTHER"} <= actions
+
+
+@pytest.mark.parametrize("kind", REMEDIES)
+def test_an_error_that_is_one_of_a_kind_has_its_button(kind):
+    """Kinds of errors are divided further as time goes by."""
+    kin = type("Kin", (kind,), {})
+    assert action_for(kin("A cause")) == action_for(kind("A cause"))

@@ -169,3 +169,15 @@ def test_a_file_that_is_taken_for_a_rest_is_made_again(temporary, tmp_path, monk
     with temporary.own_folder() as folder:
         assert {path.name for path in tmp_path.iterdir()} == {folder.name, f"{folder.name}.owner"}
     assert len(times) == 2 and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
+def test_a_folder_is_of_its_user_alone_whatever_the_mask(temporary, mask):
+    """Meshes of others may lie in it, and where it stands everybody may look."""
+    before = os.umask(mask)
+    try:
+        with temporary.own_folder() as folder:
+            assert folder.stat().st_mode & 0o777 == 0o700
+            assert not temporary._owner_of(folder).stat().st_mode & 0o077
+    finally:
+        os.umask(before)

@@ -331,6 +331,40 @@ def test_garbage_is_collected_in_front(threads, package, monkeypatch):
     assert set(Cycle.freed) == {threading.main_thread()} and gc.isenabled()
 
 
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("how", ["end", "close", "fail"])
+def test_garbage_waits_until_the_last_of_several_solvers_has_ended(package, first, how):
+    """One that was cancelled ends a little later, while the next is at work already."""
+    run = package("session.run")
+
+    def solver():
+        yield 1
+        if how == "fail":
+            raise ValueError("no result")
+        yield 2
+
+    def end(steps):
+        if how == "close":
+            steps.close()
+        elif how == "fail":
+            with pytest.raises(ValueError, match="no result"):
+                list(steps)
+        else:
+            assert list(steps) == [2]
+
+    assert gc.isenabled()
+    both = [run._without_collector(solver()) for _ in range(2)]
+    try:
+        for steps in both:
+            assert next(steps) == 1 and not gc.isenabled()
+        end(both[first])
+        assert not gc.isenabled()
+        end(both[1 - first])
+        assert gc.isenabled()
+    finally:
+        gc.enable()
+
+
 def test_a_solver_aside_complains_as_any_other(threads):
     bpy.ops.mesh.primitive_cube_add()
     operator = scenes.stand_in("uv.omt_unwrap", seams="EXISTING")

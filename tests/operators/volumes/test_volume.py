@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
 
 import bpy
 
@@ -110,3 +111,16 @@ def test_faces_that_are_wrong_are_those_of_the_mesh_and_are_selected():
     told = scenes.error_of(bpy.ops.object.omt_volume, tets=100)
     assert "Traceback" not in told and "(3 faces: 3, 6, 7)" in told, told
     assert [p.index for p in obj.data.polygons if p.select] == [3, 6, 7]
+
+
+@pytest.mark.parametrize("library", ["TETGEN", "TETWILD"])
+@pytest.mark.parametrize(
+    "there", [(), ("tetgen",), ("pytetwild",), ("pyvista",), ("pytetwild", "pyvista"), ("tetgen", "pyvista")]
+)
+def test_a_library_is_missing_as_long_as_one_of_its_packages_is(package, monkeypatch, library, there):
+    """What is named is all that pip shall install."""
+    module = package("operators.volumes.volume")
+    find = lambda name: object() if name in there else None  # noqa: E731
+    monkeypatch.setattr(module, "importlib", SimpleNamespace(util=SimpleNamespace(find_spec=find)))
+    needed = module.PACKAGES[library]
+    assert module.missing(library) == ("" if set(needed) <= set(there) else " ".join(needed))
