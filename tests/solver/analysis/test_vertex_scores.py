@@ -99,3 +99,20 @@ def test_vertices_of_no_face_play_no_part_in_scores(kind):
     chosen = np.arange(len(V)) == 5
     found = vertex_score(kind, np.concatenate([V, far]), F, np.append(chosen, [True] * 3))
     np.testing.assert_allclose(found[: len(V)], vertex_score(kind, V, F, chosen), rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize("pulled", range(4))
+def test_of_several_ways_across_pairs_of_triangles_the_shortest_counts(pulled):
+    """From pole to pole of an octahedron there are four, one over each edge of its equator."""
+    angle = np.pi / 2 * np.arange(4)
+    V = np.concatenate([np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]), [[0, 0, 1], [0, 0, -1]]])
+    # Two edges of the equator come nearer to the axis, one of them the most.
+    V[pulled] *= 0.5
+    V[(pulled + 1) % 4] *= 0.7
+    F = np.array([[k, (k + 1) % 4, 4] for k in range(4)] + [[(k + 1) % 4, k, 5] for k in range(4)])
+    ways = []
+    for k in range(4):
+        along = np.linspace(0, 1, 20001)[:, None]
+        on_edge = V[k] + along * (V[(k + 1) % 4] - V[k])
+        ways.append(2 * np.linalg.norm(on_edge - V[4], axis=1).min())
+    assert distance(V, F, np.array([4]))[5] == pytest.approx(min(ways), rel=1e-6) and max(ways) > 1.1 * min(ways)

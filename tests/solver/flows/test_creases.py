@@ -102,3 +102,17 @@ def test_what_is_near_is_around_or_within_reach_of_one_of_about_its_size(seeds, 
             near |= np.linalg.norm(at - at[v], axis=1) < reach
     assert np.array_equal(creases._near((V, after), F, chosen), near)
     assert chosen.sum() < near.sum() < len(V)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_how_faces_are_numbered_does_not_decide_which_crossings_are_new(seed):
+    """A line along which two plates meet moves on from face to face; of a pair, either may come first by then."""
+    V, F = meshes.grid(6, 6)
+    plate = np.column_stack([V[:, :2], np.zeros(len(V))])
+    wall = np.column_stack([np.full(len(V), 0.43), V[:, 0], V[:, 1] - 0.52])
+    before, faces = np.concatenate([plate, wall]), np.concatenate([F, F + len(V)])
+    after = before + np.where(np.arange(len(before))[:, None] < len(V), 0.0, [0.08, 0.0, 0.0])
+    order = np.random.default_rng(seed).permutation(len(faces))
+    plain, other = (new_intersections(before, after, FaceCrossings(of)) for of in (faces, faces[order]))
+    assert len(FaceCrossings(faces).pairs(after)) > 5
+    assert {frozenset(pair) for pair in order[other].tolist()} == {frozenset(pair) for pair in plain.tolist()}

@@ -14,7 +14,7 @@ from omt_uv.solver.partition import division, spacing
 from omt_uv.solver.partition.polar_coordinates import WindowMesh, polar_coordinates
 from omt_uv.solver.partition.sites import Sites
 from omt_uv.solver.signatures import harmonics, membrane, wasserstein
-from omt_uv.solver.signatures.signature import Signature
+from omt_uv.solver.signatures.signature import Signature, closed_part
 
 # ---- membranes -----------------------------------------------------------------------------------------------
 
@@ -281,3 +281,13 @@ def test_sites_of_a_plane_are_as_far_apart_as_the_nearest(monkeypatch):
     # Nobody sees anybody in windows that are too small.
     monkeypatch.setattr(spacing, "_areas", lambda mesh, division: np.full(k, 1e-9 * area))
     assert np.isinf(spacing.site_distances(mesh, whole)).sum() >= k - 2
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 4.0])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_part_that_is_compared_is_that_of_most_area_not_of_most_faces(scale, swapped):
+    many, few = meshes.icosphere(2), meshes.icosphere(0)
+    parts = [many, (scale * few[0] + 9, few[1])]
+    (V, F), (W, G) = parts[::-1] if swapped else parts
+    vertices, faces = closed_part(np.concatenate([V, W]), np.concatenate([F, G + len(V)]))
+    assert len(faces) == (len(few[1]) if scale > 1 else len(many[1])) and len(vertices) == len(faces) // 2 + 2

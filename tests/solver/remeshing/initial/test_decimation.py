@@ -9,14 +9,15 @@ from mesh_checks import topology
 
 from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.geometry import vertex_normals
-from omt_uv.solver.mesh.topology import halfedges, pair_keys
+from omt_uv.solver.mesh.topology import halfedges, pair_keys, paired, twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing import RemeshOptions, remesh
 from omt_uv.solver.remeshing.edits.vertex_count import edge_length
 from omt_uv.solver.remeshing.edits.working_mesh import WorkingMesh
 from omt_uv.solver.remeshing.initial.arc_network import find_arcs, sample_arcs
 from omt_uv.solver.remeshing.initial.component_maps import RemeshSource
-from omt_uv.solver.remeshing.initial.decimation import decimated, decimated_between_lines
+from omt_uv.solver.remeshing.initial.decimation import _working_mesh, decimated, decimated_between_lines
+from omt_uv.solver.remeshing.initial.feature_lines import LineMesh
 
 
 @pytest.mark.parametrize("count", [60, 700])
@@ -66,3 +67,18 @@ def test_keys_of_every_mesh_in_the_making_are_in_order_and_vertices_on_lines_com
     assert len(made) > 3 and sum(len(mesh.locked) > 2 for mesh in made) > 3
     for keys in (to_reopen, *(mesh.locked for mesh in made)):
         assert (np.diff(keys) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_keys_of_lines_stay_sorted_however_vertices_are_numbered(seed):
+    """Vertices on lines come first, and keys are looked for in their rows."""
+    V, F = meshes.grid(4, 4)
+    edges = paired(np.unique(pair_keys(*halfedges(F))))
+    lines = np.random.default_rng(seed).permutation(edges)[:9]
+    mesh = LineMesh(V, F, lines, lines[::2], np.array([3]), twins(F))
+    working, to_reopen = _working_mesh(mesh)
+    for keys, ends in ((working.locked, lines), (to_reopen, lines[::2])):
+        assert (np.diff(keys) > 0).all() and len(keys) == len(ends)
+        found, expected = (np.sort(places.reshape(-1, 6).round(9), axis=0) for places in
+                           (np.sort(working.points[paired(keys)], axis=1), np.sort(V[ends], axis=1)))  # fmt: skip
+        np.testing.assert_array_equal(found, expected)
