@@ -40,6 +40,20 @@ def test_an_inset_replaces_its_box_and_nothing_else():
     assert (np.diff(result[40, 16:24]) >= -1e-12).all()
 
 
+@pytest.mark.parametrize("below", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("above", [0.0, 0.6, 1.0])
+def test_what_is_laid_over_a_picture_covers_as_much_as_it_is_opaque_and_leaves_no_less(above, below):
+    """Where the detail is whole, alpha comes nearer to its own, if that is the greater, by as much as it covers."""
+    base = np.full((32, 32, 4), 0.2)
+    base[..., 3] = below
+    detail = np.full((8, 8, 4), 0.9)
+    detail[..., 3] = above
+    result = warp_with_insets(base, layout(), layout(), [InsetImage(detail, (0.25, 0.25), (0.75, 0.75))])
+    np.testing.assert_allclose(result[16, 16, :3], 0.2 + above * 0.7)
+    np.testing.assert_allclose(result[16, 16, 3], below + above * (max(above, below) - below))
+    np.testing.assert_allclose(result[2, 2], base[2, 2])
+
+
 def test_detail_stays_sharp_where_the_map_magnifies_it():
     """A quarter of the old layout fills the new one: the inset's own pixels come back, and not the base's."""
     fine = checker(256, 32)

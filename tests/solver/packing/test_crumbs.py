@@ -51,3 +51,19 @@ def test_crumbs_alone_are_islands_as_any_others():
     small = [k for k in range(1200) if k % 3]
     heaped = gathered([points[k] for k in small], [triangles[k] for k in small], 4, 1024)
     assert not heaped.crumb.any() and len(heaped.points) == 800
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_marks_of_islands_go_with_those_that_are_by_themselves_and_a_heap_has_none(seed):
+    """As whether an island may be turned: the boxes of those in a heap would meet."""
+    points, triangles = mixed(1200, seed)
+    heaped, marks = gathered(points, triangles, 4, 1024), np.random.default_rng(seed).random(1200) < 0.5
+    assert heaped.kept(marks).tolist() == [*marks[~heaped.crumb].tolist(), False]
+    assert gathered(points, triangles, 0, 1024).kept(marks) is marks
+
+
+def test_what_is_long_shows_however_thin_it_is():
+    points, triangles = mixed(1200)
+    thin = [np.array([[0, 0], [0.5, 0], [0.5, 1e-7]]), np.array([[0, 0], [1e-7, 0], [0, 0.5]])]
+    heaped = gathered([*points, *thin], [*triangles, TRIANGLE, TRIANGLE], 4, 1024)
+    assert heaped.crumb.sum() == 800 and not heaped.crumb[-2:].any()

@@ -7,7 +7,7 @@ import pytest
 
 from omt_uv.solver.mesh.spherical_geometry import triangle_areas
 from omt_uv.solver.progress import drain
-from omt_uv.solver.transport.cell_polygons import planar_cells, spherical_cell_polygons
+from omt_uv.solver.transport.cell_polygons import CellPolygons, planar_cells, spherical_cell_polygons
 from omt_uv.solver.transport.convex_domain import Disk, Rectangle
 from omt_uv.solver.transport.power_diagram import power_diagram
 from omt_uv.solver.transport.semidiscrete import transport
@@ -55,3 +55,16 @@ def test_units_do_not_matter(unit):
     found = planar_cells(unit * sites, unit**2 * weights, Rectangle(unit, unit))
     np.testing.assert_array_equal(found.start, plain.start)
     np.testing.assert_allclose(found.points / unit, plain.points, atol=1e-8)
+
+
+def test_fans_of_cells_have_two_triangles_less_than_sides_and_none_is_flat():
+    """Of cells without points, too."""
+    start = np.array([0, 0, 3, 7, 7, 12])
+    angle = np.concatenate([2 * np.pi * np.arange(n) / n for n in (3, 4, 5)])
+    cells = CellPolygons(np.column_stack([np.cos(angle), np.sin(angle)]), start)
+    triangles, owner = cells.fans()
+    assert owner.tolist() == [1, 2, 2, 4, 4, 4] and (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all()
+    assert (cells.owner[triangles] == owner[:, None]).all()
+    p = cells.points[triangles]
+    u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    np.testing.assert_allclose(np.bincount(owner, (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2, 5), cells.areas())
