@@ -130,3 +130,13 @@ def test_a_corner_is_straight_by_its_angle_alone_whatever_its_sides_measure(dent
         F, owner = polygons.cut([np.roll(np.arange(5), turn)], turn)
         V = np.column_stack([w.real, w.imag, np.zeros(5)])
         assert len(polygon_fans(V, F, owner)[1]) == (5 if dent < 0 else 0)
+
+
+@pytest.mark.parametrize("size", [1e200, -1e180])
+def test_what_is_beyond_floats_is_infinite_and_nothing_else_is(size):
+    """Not a number is neither large nor small, and whoever sums it has none at all."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    V, F = np.concatenate([size * square, square]), np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    with np.errstate(all="ignore"):
+        found = polygon_areas(V, F, np.array([3, 3, 8, 8]))
+    assert found.tolist() == [np.inf, np.inf, 0.5, 0.5]
