@@ -276,7 +276,7 @@ def test_folds_that_stay_are_laid_out_anew(folds, laid, fresh, monkeypatch):
         k = int(places[0, 0])
         return np.where(np.arange(9) < folds[min(k % 100, len(folds) - 1)], -1.0, 1.0)
 
-    monkeypatch.setattr(coarse_meshes, "_each_spot", each_spot)
+    monkeypatch.setattr(coarse_meshes, "untangle_spots", each_spot)
     monkeypatch.setattr(coarse_meshes, "signed_volumes", volumes)
     monkeypatch.setattr(coarse_meshes, "vertices_around", lambda triangles, folded, n, rings: np.ones(n, bool))
     spots = []

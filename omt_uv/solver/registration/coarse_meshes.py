@@ -16,10 +16,10 @@ from ..linalg.nested_dissection import mesh_order
 from ..linalg.sparse import solve_spd
 from ..mesh.geometry import cross2, halfedge_lengths, laplacian_from_lengths, vertex_areas
 from ..mesh.point_location import locate
-from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from ..mesh.topology import graph_components, halfedges, vertices_around
+from ..mesh.spherical_geometry import normalized, signed_volumes
+from ..mesh.topology import vertices_around
 from ..progress import Steps
-from ..sphere.untangle import straighten_around
+from ..sphere.untangle import untangle_spots
 from .surface_newton import Features
 
 # Rings of vertices around folds that are straightened, first few, then more.
@@ -123,7 +123,7 @@ def straightened(before: np.ndarray, triangles: np.ndarray, after: np.ndarray, h
     if after.shape[1] == 2:
         return after
     for rings in RINGS:
-        after = yield from _each_spot(before, triangles, after, held, rings)
+        after = yield from untangle_spots(before, triangles, after, held, rings)
     folded = ~(signed_volumes(after, triangles) > 0)
     if folded.any():
         spot = vertices_around(triangles, folded, len(after), LAID_OUT_RINGS) & ~held
@@ -132,28 +132,9 @@ def straightened(before: np.ndarray, triangles: np.ndarray, after: np.ndarray, h
             return after
         fresh = laid_out(before, triangles, after, spot)
         for rings in RINGS:
-            fresh = yield from _each_spot(before, triangles, fresh, held, rings)
+            fresh = yield from untangle_spots(before, triangles, fresh, held, rings)
         if (signed_volumes(fresh, triangles) > 0).all():
             return fresh
-    return after
-
-
-def _each_spot(before, triangles, after, held, rings: int) -> Steps[np.ndarray]:
-    """The same for what is so many rings around folds, where it works."""
-    folded = ~(signed_volumes(after, triangles) > 0)
-    if not folded.any():
-        return after
-    touched = vertices_around(triangles, folded, len(after), rings) & ~held
-    tail, head = halfedges(triangles)
-    inside = touched[tail] & touched[head]
-    label = graph_components(tail[inside], head[inside], len(after))[1]
-    # All at once, where folds may wander for a while, then one by one, where one failure is not that of all.
-    for spot in (touched, *(touched & (label == number) for number in np.unique(label[touched]).tolist())):
-        if (signed_volumes(after, triangles[spot[triangles].any(axis=1)]) > 0).all():
-            continue
-        area = np.abs(spherical_areas(after, triangles))
-        straight = yield from straighten_around(before, triangles, after, area, spot)
-        after = after if straight is None else straight
     return after
 
 

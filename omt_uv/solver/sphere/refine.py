@@ -35,7 +35,7 @@ from ..refinement.hessian_blocks import Assembly, assembly_of, lone_triangles
 from ..refinement.mirrored_motion import find_symmetry
 from .newton import SphereProblem
 from .symmetry import symmetric_map
-from .untangle import untangle_on_sphere
+from .untangle import untangle_on_sphere, untangle_spots
 
 # Predicted decrease over energy at which an area weight is left for a greater one, where the area error is not reached.
 TOLERANCE = 1e-2
@@ -46,6 +46,8 @@ MOST_GROWTH = 10.0
 ENOUGH_PROGRESS = 0.9
 # Area error, over that of a free map, that a symmetric one may have where neither reaches what was asked for.
 MUCH_LESS = 1.25
+# Rings of vertices around folds of a start that are straightened by themselves, first few, then more.
+RINGS = (1, 2, 4)
 # Where a symmetric map is through, of the time of a refinement.
 SYMMETRIC = 0.7
 # Steps on the way from coarse to fine: the finer levels do the rest.
@@ -56,7 +58,7 @@ RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 class SphereRefinement:
     """A refined map: positions (n,3) on the sphere, no face folded.
 
-    iterations: Newton steps, after those for untangling; residual: last predicted decrease over energy; area_error: the
+    iterations: Newton steps, after those that untangle all faces at once; residual: last predicted decrease over energy; area_error: the
     larger of the share of the area in the wrong place and the deviation of the areas' ratios; area_weight and energy at
     the end; status: "converged", "stalled" or "steps".
     """
@@ -109,6 +111,7 @@ def sphere_refine(
     yield Progress("Refinement", 0.0)
     # Its images give a triangle the other diagonal of a quad, too.
     problem, order = _renumbered(vertices, triangles, target, polygons if mirror_polygons is None else mirror_polygons)
+    positions = yield from _spots_straightened(vertices, triangles, positions, target)
     start, steps = yield from untangle_on_sphere(problem.faces, problem.assembly, positions[order])
     folded = np.flatnonzero(~(signed_volumes(start, problem.faces.triangles) > 0))
     if len(folded):
@@ -131,6 +134,17 @@ def sphere_refine(
         found = found if found is not None and found.area_error <= MUCH_LESS * free.area_error else free
     yield Progress("Refinement", 1.0)
     return replace(found, positions=_in_order(found.positions, order), untangling=steps)
+
+
+def _spots_straightened(
+    vertices: np.ndarray, triangles: np.ndarray, positions: np.ndarray, target: np.ndarray
+) -> Steps[np.ndarray]:
+    """The start (n,3) with what is around its folds straightened, first by few vertices: where all of them move, folds
+    of limbs that lie in few points of the conformal map become more."""
+    held, area = np.zeros(len(positions), bool), 4 * np.pi * target / target.sum()
+    for rings in RINGS:
+        positions = yield from untangle_spots(vertices, triangles, positions, held, rings, area)
+    return positions
 
 
 def relax(

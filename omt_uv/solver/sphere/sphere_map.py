@@ -44,6 +44,8 @@ AREA_KEPT = 1.5
 FEW_JOINED = 0.1
 # Cells may be off by this share of their areas: the refinement that follows starts as well from these.
 START_TOLERANCE = 0.1
+# And by this, where rounding ends the search: a start from coarse to fine has limbs lie otherwise, as chance has it.
+START_ENOUGH = 0.5
 # From coarse to fine, where the transport failed.
 MULTILEVEL = (0.4, 0.3)
 
@@ -242,7 +244,8 @@ def _transport_start(found: ConformalSphere, surface: ClosedSurface, target: np.
     area = face_areas(surface.vertices, surface.triangles)
     mass = vertex_areas(surface.vertices, surface.triangles, target / area)
     hull = Hull(found.triangles, twins(found.triangles))
-    return (yield from sphere_transport(found.sites, mass, START_TOLERANCE, hull)).cells.centroids()
+    transport = sphere_transport(found.sites, mass, START_TOLERANCE, hull, enough=START_ENOUGH)
+    return (yield from transport).cells.centroids()
 
 
 def _at_once(flow: SphereFlow) -> Steps[np.ndarray]:

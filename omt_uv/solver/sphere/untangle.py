@@ -13,7 +13,7 @@ import numpy as np
 from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import Elements, FaceDerivatives, elements, face_derivatives_of, squared
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
-from ..mesh.topology import vertices_around
+from ..mesh.topology import graph_components, halfedges, vertices_around
 from ..progress import Progress, Steps
 from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import ARMIJO
@@ -116,6 +116,36 @@ def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> FaceDer
         2 * by_inner + 4 * inner * ii,
     )
     return face_derivatives_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
+
+
+def untangle_spots(
+    reference: np.ndarray,
+    triangles: np.ndarray,
+    positions: np.ndarray,
+    held: np.ndarray,
+    rings: int,
+    area: np.ndarray | None = None,
+) -> Steps[np.ndarray]:
+    """Unit vectors (n,3) with the folded faces straightened, where it works, by vertices so many rings around them.
+
+    The faces (m,3) are to keep the shapes of the reference (n,3) and the area (m,), that which they have by default;
+    held vertices (n,) bool stay.
+    """
+    folded = ~(signed_volumes(positions, triangles) > 0)
+    if not folded.any():
+        return positions
+    touched = vertices_around(triangles, folded, len(positions), rings) & ~held
+    tail, head = halfedges(triangles)
+    inside = touched[tail] & touched[head]
+    label = graph_components(tail[inside], head[inside], len(positions))[1]
+    # All at once, where folds may wander for a while, then one by one, where one failure is not that of all.
+    for spot in (touched, *(touched & (label == number) for number in np.unique(label[touched]).tolist())):
+        if (signed_volumes(positions, triangles[spot[triangles].any(axis=1)]) > 0).all():
+            continue
+        kept = np.abs(spherical_areas(positions, triangles)) if area is None else area
+        straight = yield from straighten_around(reference, triangles, positions, kept, spot)
+        positions = positions if straight is None else straight
+    return positions
 
 
 def untangle_locally(surface: np.ndarray, triangles: np.ndarray, positions: np.ndarray) -> Steps[np.ndarray]:

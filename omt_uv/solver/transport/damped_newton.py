@@ -19,6 +19,14 @@ from ..progress import Progress, Steps
 TOLERANCE = 5e-7  # relative error of the area of a cell
 MAX_STEPS = 100
 MAX_HALVINGS = 30  # of one step
+# What the error of all areas together is rounded by, relative to itself: among cells that start as 1e-26 of the sphere
+# steps lower it by far less, and rounding would decide whether they may be taken.
+ROUNDED = 1e-13
+# So many steps one after the other that are small, no longer than the one before and leave more than this share of the
+# residual, and rounding has ended the search.
+STALLED = 8
+LEFT = 0.99
+STUCK = "is stuck at a residual of {:.1e}"
 
 
 class Cells(Protocol):
@@ -78,11 +86,12 @@ def solve_dual(
     mass: np.ndarray,
     tolerance: float = TOLERANCE,
     max_steps: int = MAX_STEPS,
+    enough: float = 0.0,
 ) -> Steps[DualSolution[C]]:
     """Change site weights (n,), whose cells have positive area, until these have the areas mass (n,).
 
-    The residual of what is returned is above the tolerance, but at most `dual.good_residual`, where rounding ended the
-    search.
+    The residual of what is returned is above the tolerance, but at most `dual.good_residual`, or `enough`, where
+    rounding ended the search.
 
     Raises
     ------
@@ -90,7 +99,7 @@ def solve_dual(
     """
     floor = 0.5 * min(cells.area.min(), mass.min())
     first = max(largest_error(cells, mass), tolerance)
-    step = 0.0
+    step, stalled, iteration, why = 0.0, 0, 0, f"did not converge in {max_steps} steps"
     for iteration in range(max_steps):
         residual = largest_error(cells, mass)
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
@@ -101,7 +110,7 @@ def solve_dual(
             if residual <= tolerance:
                 return DualSolution(site_weights=site_weights, cells=cells, residual=residual, iterations=iteration)
         direction = dual.direction(cells, mass)
-        error = float(np.linalg.norm(cells.area - mass))
+        error, before = float(np.linalg.norm(cells.area - mass)), step
         step = min(1.0, dual.growth * step) if iteration else dual.first_step(cells, direction)
         for _ in range(MAX_HALVINGS):
             trial_weights = site_weights + step * direction
@@ -112,9 +121,18 @@ def solve_dual(
             if residual <= dual.good_residual and step <= dual.small_step:
                 return DualSolution(site_weights=site_weights, cells=cells, residual=residual, iterations=iteration)
         else:
-            raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
+            why = STUCK
+            break
         site_weights, cells = trial_weights, trial
-    raise TransportError(f"The transport did not converge in {max_steps} steps")
+        is_slow = step <= min(before, dual.small_step) and largest_error(cells, mass) > LEFT * residual
+        stalled = stalled + 1 if is_slow else 0
+        if stalled == STALLED:
+            why = STUCK
+            break
+    residual = largest_error(cells, mass)
+    if residual > enough:
+        raise TransportError(f"The transport {why.format(residual)}")
+    return DualSolution(site_weights=site_weights, cells=cells, residual=residual, iterations=iteration)
 
 
 def largest_error(cells: Cells, mass: np.ndarray) -> float:
@@ -123,4 +141,5 @@ def largest_error(cells: Cells, mass: np.ndarray) -> float:
 
 
 def _acceptable(cells: Cells, mass: np.ndarray, least_area: float, greatest_error: float) -> bool:
-    return bool(cells.area.min() >= least_area and np.linalg.norm(cells.area - mass) <= greatest_error)
+    error = np.linalg.norm(cells.area - mass)
+    return bool(cells.area.min() >= least_area and error <= (1 + ROUNDED) * greatest_error)
