@@ -58,9 +58,9 @@ RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 class SphereRefinement:
     """A refined map: positions (n,3) on the sphere, no face folded.
 
-    iterations: Newton steps, after those that untangle all faces at once; residual: last predicted decrease over energy; area_error: the
-    larger of the share of the area in the wrong place and the deviation of the areas' ratios; area_weight and energy at
-    the end; status: "converged", "stalled" or "steps".
+    iterations: Newton steps, after those that untangle all at once; residual: last predicted decrease over energy;
+    area_error: the larger of the share of the area in the wrong place and the deviation of the areas' ratios;
+    area_weight and energy at the end; status: "converged", "stalled" or "steps".
     """
 
     positions: np.ndarray

@@ -78,6 +78,46 @@ def test_a_good_residual_is_enough_where_only_small_steps_are_left():
     assert run(dual).iterations < 100
 
 
+class Rounded(SoftMax):
+    """First steps change the error by less than it is rounded by, and by that it grows each time."""
+
+    growth, small_step = 16.0, 0.05
+
+    def near(self, site_weights, cells):
+        exact = super().near(site_weights, cells).area
+        return Areas(MASS + (exact - MASS) * (1 + 1e-15 * len(self.tried)))
+
+    def first_step(self, cells, direction):
+        return 1e-20
+
+
+def test_rounding_of_the_error_holds_up_no_step():
+    found = run(Rounded())
+    assert found.residual <= 5e-7 and found.iterations < 50
+
+
+class Stalled(SoftMax):
+    """Areas that hardly come nearer to the masses, whatever the weights are."""
+
+    growth, small_step = 16.0, 0.05
+
+    def near(self, site_weights, cells):
+        super().near(site_weights, cells)
+        off = 0.3 * (1 - 1e-4) ** len(self.tried)
+        return Areas(MASS * (1 + off * np.array([1, -1, 1, -1])))
+
+
+def test_a_search_that_rounding_has_ended_says_so_at_once_or_will_do():
+    dual = Stalled()
+    with pytest.raises(TransportError, match=r"stuck at a residual of 3\.0e-01"):
+        run(dual)
+    assert len(dual.tried) < 100
+    with pytest.raises(TransportError, match="stuck"):
+        run(Stalled(), enough=0.25)
+    found = run(Stalled(), enough=0.35)
+    assert 0.25 < found.residual == largest_error(found.cells, MASS) < 0.35
+
+
 def test_masses_are_positive_and_finite():
     for wrong in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(TransportError) as caught:
