@@ -108,7 +108,6 @@ def sphere_refine(
     """
     if not 0 <= balance <= 1:
         raise ValueError(f"balance must lie in [0, 1], not {balance}")
-    yield Progress("Refinement", 0.0)
     # Its images give a triangle the other diagonal of a quad, too.
     problem, order = _renumbered(vertices, triangles, target, polygons if mirror_polygons is None else mirror_polygons)
     positions = yield from _spots_straightened(vertices, triangles, positions, target)
@@ -141,6 +140,7 @@ def _spots_straightened(
 ) -> Steps[np.ndarray]:
     """The start (n,3) with what is around its folds straightened, first by few vertices: where all of them move, folds
     of limbs that lie in few points of the conformal map become more."""
+    yield Progress("Refinement", 0.0)
     held, area = np.zeros(len(positions), bool), 4 * np.pi * target / target.sum()
     for rings in RINGS:
         positions = yield from untangle_spots(vertices, triangles, positions, held, rings, area)

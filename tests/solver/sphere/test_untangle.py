@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from sphere_shapes import random_sphere
 
 from omt_uv.solver.maps.energy import elements
@@ -10,7 +11,7 @@ from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_area
 from omt_uv.solver.mesh.topology import vertices_around
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
-from omt_uv.solver.sphere.untangle import RINGS, straighten_around, untangle_locally, untangle_on_sphere
+from omt_uv.solver.sphere.untangle import RINGS, straighten_around, untangle_locally, untangle_on_sphere, untangle_spots
 
 
 def folded_sphere():
@@ -32,6 +33,26 @@ def test_folds_are_straightened_and_all_else_stays_to_the_bit():
     np.testing.assert_array_equal(found[~touched], tangled[~touched])
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-14)
     np.testing.assert_allclose(spherical_areas(found, F).sum(), 4 * np.pi, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rings", [1, 2])
+@pytest.mark.parametrize("given", [False, True])
+def test_spots_are_straightened_one_without_the_other(rings, given):
+    """Two spots, of which one is held, so that both at once fail: the other is straightened alone."""
+    P, F, tangled = folded_sphere()
+    far = int((P @ P[7]).argmin())
+    neighbours = np.setdiff1d(np.unique(F[(far == F).any(axis=1)]), far)
+    tangled[far] = 2.2 * P[neighbours[0]] - 1.2 * P[far]
+    tangled[far] /= np.linalg.norm(tangled[far])
+    near = vertices_around(F, (far == F).any(axis=1), len(P), rings + 1)
+    held, area = near.copy(), spherical_areas(P, F) if given else None
+    found = drain(untangle_spots(P, F, tangled, held, rings, area))
+    folded, touched = signed_volumes(found, F) <= 0, vertices_around(F, signed_volumes(tangled, F) <= 0, len(P), rings)
+    assert folded.any() and near[F[folded]].all()
+    np.testing.assert_allclose(found[held | ~touched], tangled[held | ~touched], atol=1e-15)
+    free = drain(untangle_spots(P, F, tangled, np.zeros(len(P), bool), rings, area))
+    assert (signed_volumes(free, F) > 0).all()
+    np.testing.assert_allclose(free[~touched], tangled[~touched], atol=1e-15)
 
 
 def test_only_free_vertices_move():
