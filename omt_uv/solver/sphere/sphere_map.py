@@ -45,7 +45,7 @@ FEW_JOINED = 0.1
 # Cells may be off by this share of their areas: the refinement that follows starts as well from these.
 START_TOLERANCE = 0.1
 # And by this, where rounding ends the search: a start from coarse to fine has limbs lie otherwise, as chance has it.
-START_ENOUGH = 0.5
+START_TOLERATED = 0.5
 # From coarse to fine, where the transport failed.
 MULTILEVEL = (0.4, 0.3)
 
@@ -244,7 +244,7 @@ def _transport_start(found: ConformalSphere, surface: ClosedSurface, target: np.
     area = face_areas(surface.vertices, surface.triangles)
     mass = vertex_areas(surface.vertices, surface.triangles, target / area)
     hull = Hull(found.triangles, twins(found.triangles))
-    transport = sphere_transport(found.sites, mass, START_TOLERANCE, hull, enough=START_ENOUGH)
+    transport = sphere_transport(found.sites, mass, START_TOLERANCE, hull, tolerated=START_TOLERATED)
     return (yield from transport).cells.centroids()
 
 

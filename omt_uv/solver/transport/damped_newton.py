@@ -86,12 +86,12 @@ def solve_dual(
     mass: np.ndarray,
     tolerance: float = TOLERANCE,
     max_steps: int = MAX_STEPS,
-    enough: float = 0.0,
+    tolerated: float = 0.0,
 ) -> Steps[DualSolution[C]]:
     """Change site weights (n,), whose cells have positive area, until these have the areas mass (n,).
 
-    The residual of what is returned is above the tolerance, but at most `dual.good_residual`, or `enough`, where
-    rounding ended the search.
+    The residual of what is returned is above the tolerance, but at most `dual.good_residual`, or what is `tolerated`,
+    where rounding ended the search.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def solve_dual(
             why = STUCK
             break
     residual = largest_error(cells, mass)
-    if residual > enough:
+    if residual > tolerated:
         raise TransportError(f"The transport {why.format(residual)}")
     return DualSolution(site_weights=site_weights, cells=cells, residual=residual, iterations=iteration)
 

@@ -31,7 +31,7 @@ class SphereTransport:
     site_weights : (n,)
     cells : spherical power diagram
     residual : largest |area - mass| / mass. It is above the tolerance, but at most `SphereDual.good_residual`, or what
-        is said to be enough, where rounding ended the search.
+        is tolerated, where rounding ended the search.
     iterations : Newton steps
     diagrams : how many were built
     """
@@ -49,13 +49,13 @@ def sphere_transport(
     tolerance: float = TOLERANCE,
     hull: Hull | None = None,
     max_steps: int = MAX_STEPS,
-    enough: float = 0.0,
+    tolerated: float = 0.0,
 ) -> Steps[SphereTransport]:
     """Transport the uniform measure of the sphere to unit vectors (n,3) with mass (n,) > 0, scaled to sum to 4 pi.
 
     `hull`, a triangulation of the sites, is where the search for their convex hull starts; sites closer together than
-    about 1e-7 need one. `enough` is a residual that will do where rounding ends the search. A solution exists where no
-    half of the mass is gathered too narrowly, as after centring (Oliker 2007).
+    about 1e-7 need one. `tolerated` is a residual that will do where rounding ends the search. A solution exists where
+    no half of the mass is gathered too narrowly, as after centring (Oliker 2007).
 
     Raises
     ------
@@ -68,7 +68,7 @@ def sphere_transport(
         hull, _ = by_flips(hull, sites, start)
     cells = spherical_cells(sites, start, hull or by_hull(sites, start))
     dual = SphereDual(sites)
-    found = yield from solve_dual(dual, start, cells, mass, tolerance, max_steps, enough)
+    found = yield from solve_dual(dual, start, cells, mass, tolerance, max_steps, tolerated)
     return SphereTransport(
         site_weights=found.site_weights,
         cells=found.cells,

@@ -113,8 +113,8 @@ def test_a_search_that_rounding_has_ended_says_so_at_once_or_will_do():
         run(dual)
     assert len(dual.tried) < 100
     with pytest.raises(TransportError, match="stuck"):
-        run(Stalled(), enough=0.25)
-    found = run(Stalled(), enough=0.35)
+        run(Stalled(), tolerated=0.25)
+    found = run(Stalled(), tolerated=0.35)
     assert 0.25 < found.residual == largest_error(found.cells, MASS) < 0.35
 
 
