@@ -71,6 +71,8 @@ NO_WARNINGS = {
     ("solver/sphere/moser_flow.py", "points left"): "an error",
     ("solver/subdivision/catmull_clark.py", "A subdivided mesh of about {} quads"): "an error",
     ("solver/subdivision/catmull_clark.py", "Ask for fewer levels"): "a remedy",
+    ("solver/transport/damped_newton.py", "did not converge in {} steps"): "an error",
+    ("solver/transport/damped_newton.py", "is stuck at a residual of {}"): "an error",
 }
 # Those of `test_every_warning_of_new_meshes`.
 ELSEWHERE = ("solver/remeshing/", "solver/sphere/sphere_map.py", "solver/volumes/", "solver/registration/")
