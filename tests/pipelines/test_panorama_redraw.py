@@ -65,7 +65,7 @@ def test_a_flat_picture_is_nowhere_pinched():
         drain(redraw(ramp, EQUIRECT, SINUSOIDAL))
 
 
-@pytest.mark.parametrize("size", [(4, 4), (6, 6), (7, 7)])
+@pytest.mark.parametrize("size", [(4, 4), (6, 6), (7, 7), (4, 8), (7, 3)])
 def test_beyond_a_side_of_the_octahedral_square_it_goes_on_where_that_side_is_glued_to(size):
     """Every side is glued to itself about its midpoint: what is as far inside at the image of a point in it follows."""
     rows, columns = size
@@ -74,8 +74,8 @@ def test_beyond_a_side_of_the_octahedral_square_it_goes_on_where_that_side_is_gl
         for uv in (np.column_stack([along, side]), np.column_stack([side, along])):
             np.testing.assert_allclose(to_sphere(uv, OCTAHEDRAL), to_sphere(uv, OCTAHEDRAL)[::-1], atol=1e-9)
     image = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), axis=-1)
-    inner = np.arange(columns)
-    for i, j in ((-1, inner), (rows, inner), (inner, -1), (inner, columns)):
+    down, across = np.arange(rows), np.arange(columns)
+    for i, j in ((-1, across), (rows, across), (down, -1), (down, columns)):
         i, j = np.broadcast_arrays(i, j)
         at = np.stack([i, j], axis=-1)
         # The midpoint of the side, in pixels whose centres are whole numbers.

@@ -27,3 +27,11 @@ def test_sharpness_of_a_cube():
     V, F = meshes.cube()
     np.testing.assert_allclose(sharpness(V, F), np.pi / 2)
     np.testing.assert_allclose(sharpness(*meshes.grid()), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("measure", [gaussian_curvature, mean_curvature, sharpness])
+def test_a_surface_far_from_the_origin_has_the_curvature_that_it_has_there(measure):
+    """As long as its coordinates have room for it: these are whole numbers of a small unit."""
+    V, F = meshes.icosphere(2)
+    V = np.round(V * 2**20) / 2**20
+    np.testing.assert_allclose(measure(V + [2.0**22, -(2.0**21), 2.0**20], F), measure(V, F), rtol=1e-12, atol=1e-13)

@@ -51,3 +51,19 @@ def test_shapes_are_told_apart_alike_in_every_unit(unit, mirror):
         assert (matching(unit * V, F, other, F) is not None) == found
         islands = [(unit * V, F, V[:, :2]), (other, F, V[:, :2] + 3)]
         assert stacks(islands).moved == int(found)
+
+
+@pytest.mark.parametrize("height", [0.0, 1.0])
+def test_what_a_motion_takes_to_another_is_not_mirrored_although_a_reflection_does_so_too(height):
+    """A flat island, and one that is its own mirror image: neither is lost where mirror images do not count."""
+    V = np.array([[3, 0, 0], [-1, 1, 0], [-1, -1, 0], [0, 0, height], [1, 0, -0.4 * height]])
+    F = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 4, 1], [0, 2, 4]])[: 3 if height == 0 else 5]
+    V = V[: F.max() + 1]
+    turned = V @ np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0] + [4, 5, 6]
+    for other in (turned, turned * [1, 1, -1]):
+        found = matching(V, F, other, F)
+        assert not found.mirrored and found.vertices[[0, 3]].tolist() == [0, 3]
+        islands = [(V, F, V[:, :2]), (other, F, V[:, :2] + 3)]
+        assert stacks(islands, mirrored=False).moved == 1
+    lopsided = V + np.arange(len(V))[:, None] * [0, 0.1 * height, 0]
+    assert matching(lopsided, F, lopsided * [1, -1, 1], F).mirrored == (height > 0)

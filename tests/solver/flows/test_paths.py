@@ -104,3 +104,12 @@ def test_every_handle_goes_its_own_way_whatever_others_do(kind):
         mine = owner == k
         alone = handle_paths(start[mine], end[mine], np.zeros(4, int), kind, 6, MIDDLE, 2.0)
         np.testing.assert_allclose(together[:, mine], alone, atol=1e-12)
+
+
+@pytest.mark.parametrize("farther", [1.0, 1.5, 20.0])
+def test_from_its_reach_on_a_blend_is_a_radius_path(farther):
+    start, end = quarter_turn()
+    owner, distance = np.arange(len(start)), (np.linalg.norm(start, axis=1) + np.linalg.norm(end, axis=1)) / 2
+    reach = distance.min() / farther
+    blend, turned = (handle_paths(start, end, owner, kind, 8, MIDDLE, reach) for kind in (BLEND, RADIUS))
+    np.testing.assert_allclose(blend, turned, atol=1e-12)

@@ -177,3 +177,19 @@ def test_boxes_in_blocks_do_not_overlap():
         apart = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
         assert apart[~np.eye(len(low), dtype=bool)].min() > -1e-9
         assert sizes[block.members].prod(axis=1).sum() > 0.6 * block.size.prod()
+
+
+@pytest.mark.parametrize(
+    ("growth", "beside"), [(0.0, [(0, 0)]), (2.0, [(2, 0), (0, 2)]), (5.0, [(5, 0), (3, 4), (4, 3)])]
+)
+def test_what_is_just_as_far_as_an_island_grows_lies_in_its_cells(growth, beside):
+    """Else two islands could be nearer than the margin by what rounding takes."""
+    square = np.array([[0, 0], [8, 0], [8, 8], [0, 8.0]])
+    ((cells, low),) = grown_cells(outlines_of([square], [np.array([[0, 1, 2], [0, 2, 3]])]), growth)
+    offsets = np.array([(sx * x, sy * y) for x, y in beside for sx in (1, -1) for sy in (1, -1)])
+    points = (square[:, None] + offsets).reshape(-1, 2).astype(int)
+    column, row = (points - low).T
+    assert cells[row, column].all()
+    y, x = np.nonzero(cells)
+    gap = [np.maximum(0, np.maximum(-at - 1, at - 8)) for at in (x + low[0], y + low[1])]
+    assert (np.hypot(*gap) <= growth).all()

@@ -103,3 +103,12 @@ def test_the_smallest_box_is_the_same_however_a_map_lay(angle):
     np.testing.assert_allclose(found - found.mean(axis=0), expected - expected.mean(axis=0), atol=1e-9)
     height = found[ConvexHull(found).vertices, 1]
     assert np.ptp(found[:, 0]) >= np.ptp(found[:, 1]) and height.mean() <= (height.min() + height.max()) / 2
+
+
+def test_islands_that_may_be_turned_are_all_by_default():
+    """But for those of no area, which have no smallest box."""
+    flat = np.array([[0, 0], [1, 3], [2, 6], [3, 9.0]])
+    islands, triangles = [flat, *corners(3)], [SQUARE, FAN, FAN, FAN]
+    found, asked = (drain(pack_turned(islands, triangles, 2, turnable=t)) for t in (None, np.ones(4, bool)))
+    for one, other in zip(found.islands, asked.islands, strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -97,3 +97,16 @@ def test_lines_along_a_side_are_in_the_polygon_for_its_length(name):
         off = np.abs(polygon.tangent @ polygon.normal.T) == 0
         assert off.any(axis=1).any()
         np.testing.assert_allclose((leave - enter)[off.any(axis=1)], polygon.length[off.any(axis=1)])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_parameters_of_points_beside_a_corner_are_those_of_the_corner(seed):
+    """Where a polygon ends it begins, whichever of both sides rounding finds nearer."""
+    rng = np.random.default_rng(seed)
+    turn = np.sort(rng.uniform(0, 2 * np.pi, 5))
+    polygon = ConvexPolygon(np.column_stack([np.cos(turn), np.sin(turn)]))
+    for k, corner in enumerate(polygon.corners):
+        beyond = polygon.normal[k] + polygon.normal[k - 1]
+        s = polygon.boundary_parameter(corner + rng.random((200, 1)) * beyond)
+        assert (s >= 0).all() and (s < polygon.period).all()
+        np.testing.assert_allclose(s, polygon.start[k], atol=1e-12)

@@ -313,3 +313,18 @@ def test_what_flips_leave_unproven_is_no_result(domain, sites, count, monkeypatc
     assert not any(solutions[0].cells.dual is dual for dual in by_hand)
     anew = power_diagram(points, found.site_weights, domain)
     np.testing.assert_allclose(np.sort(found.cells.area), np.sort(anew.area), rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["disk", "rectangle"])
+@pytest.mark.parametrize("more", [0.0, 3.0])
+def test_from_the_weights_that_were_found_there_is_nowhere_to_go(name, more):
+    """In the order of the caller's sites, whichever that is; what all weights have in common does not count."""
+    domain = {"disk": Disk(), "rectangle": Rectangle(2.0, 0.5)}[name]
+    sites, mass = inside(domain, 80), np.random.default_rng(0).uniform(1, 3, 80)
+    found = drain(transport(sites, mass, domain))
+    assert found.iterations > 0
+    order = np.random.default_rng(1).permutation(80)
+    again = drain(transport(sites[order], mass[order], domain, site_weights=found.site_weights[order] + more))
+    assert again.iterations == 0
+    np.testing.assert_allclose(again.cells.area, found.cells.area[order], rtol=1e-9)
+    np.testing.assert_allclose(np.diff(again.site_weights), np.diff(found.site_weights[order]), atol=1e-12)
