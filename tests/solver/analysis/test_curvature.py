@@ -21,6 +21,9 @@ def test_mean_curvature_of_a_sphere():
     V, F = meshes.icosphere(3)
     assert mean_curvature(3 * V + 50, F).sum() == pytest.approx(4 * np.pi * 3, rel=0.01)
     assert not mean_curvature(*meshes.grid()).any()
+    V, F = meshes.bumpy()
+    boundary = on_boundary(F, len(V))
+    assert not mean_curvature(V, F)[boundary].any() and mean_curvature(V, F)[~boundary].any()
 
 
 def test_sharpness_of_a_cube():

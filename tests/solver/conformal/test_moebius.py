@@ -1,10 +1,12 @@
 """Moebius maps: they stay on the sphere, invert each other, and keep cross-ratios."""
 
+import meshes
 import numpy as np
 import pytest
 
 from omt_uv.solver.conformal.moebius import boost, centre_on_sphere, to_plane, to_sphere
 from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.mesh.spherical_geometry import signed_volumes
 
 
 @pytest.fixture
@@ -55,3 +57,15 @@ def test_what_is_centred_stays(points):
 def test_half_of_the_mass_in_one_point_has_no_centre(points):
     with pytest.raises(PrecisionError, match="The map gathers half of the surface in one"):
         centre_on_sphere(points, np.where(np.arange(100) == 3, 200.0, 1.0))
+
+
+@pytest.mark.parametrize("far", [0.5, 0.9, 0.99, 0.999])
+@pytest.mark.parametrize("way", [[0, 0, 1.0], [0.6, 0, -0.8]])
+def test_what_is_centred_is_not_turned_inside_out(far, way):
+    """Wherever nearly all of it was gathered: a map beyond the ball would see it from inside."""
+    V, F = meshes.icosphere(2)
+    gathered = boost(V, far * np.array(way))
+    mass = np.random.default_rng(2).uniform(0.5, 2, len(V))
+    centred = centre_on_sphere(gathered, mass)
+    np.testing.assert_allclose(mass @ centred / mass.sum(), 0, atol=1e-12)
+    assert (signed_volumes(centred, F) > 0).all()

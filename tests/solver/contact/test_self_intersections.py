@@ -36,7 +36,7 @@ def test_random_triangles_agree_with_brute_force():
     assert [tuple(p) for p in intersecting_pairs(V, F)] == by_sampling(V, F)
 
 
-@pytest.mark.parametrize("size", [1e-4, 1e3])
+@pytest.mark.parametrize("size", [1e-20, 1e-4, 1e3, 1e20])
 def test_their_number_does_not_depend_on_size_and_place(size):
     rng = np.random.default_rng(3)
     V, F = rng.uniform(-1, 1, (60, 3)), np.arange(60).reshape(-1, 3)

@@ -112,3 +112,13 @@ def test_islands_that_may_be_turned_are_all_by_default():
     found, asked = (drain(pack_turned(islands, triangles, 2, turnable=t)) for t in (None, np.ones(4, bool)))
     for one, other in zip(found.islands, asked.islands, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_large_island_that_may_not_be_turned_lies_as_it_lay():
+    """But for quarter turns, as it has them where nothing is turned."""
+    bar = np.array([[0, 0], [10, 0], [10, 0.5], [0, 0.5]])
+    stays, plain = (
+        drain(packing).islands[0]
+        for packing in (pack_turned([bar], [SQUARE], 0, turnable=np.zeros(1, bool)), pack([bar], [SQUARE], 0))
+    )
+    np.testing.assert_allclose(stays, plain, atol=1e-12)

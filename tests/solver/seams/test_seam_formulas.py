@@ -356,21 +356,40 @@ def test_paths_and_depths_are_shortest(coarse):
     assert graph.is_open(steps)
 
 
-@pytest.mark.parametrize("off", [1e-12, -1e-12, 1e-8, -1e-8, 1e-3, -1e-3])
-def test_of_ends_that_are_worth_the_same_the_farthest_is_taken_and_rounding_does_not_choose(off, monkeypatch):
+@pytest.fixture
+def row(monkeypatch):
     """A row of vertices from a tip to the cut, where a path may end at the first three."""
     cost = np.arange(6.0)[::-1]
-    graph = SimpleNamespace(
-        boundary=cost == 0, ends=np.zeros((0, 2), int), image=np.arange(6), paths_from=lambda _: (cost, np.arange(1, 7))
-    )
     monkeypatch.setattr(growth, "_tips", lambda *_: np.array([0]))
     monkeypatch.setattr(growth, "path_to", lambda before, tip: np.arange(6))
+    return SimpleNamespace(
+        boundary=cost == 0, ends=np.zeros((0, 2), int), image=np.arange(6), paths_from=lambda _: (cost, np.arange(1, 7))
+    )
+
+
+@pytest.mark.parametrize("off", [1e-12, -1e-12, 1e-8, -1e-8, 1e-3, -1e-3])
+def test_of_ends_that_are_worth_the_same_the_farthest_is_taken_and_rounding_does_not_choose(off, row):
     # What a cut from each on lowers the spread by, that nearest to the cut first: the second and third are worth more.
     falls = np.array([0.1, 0.2, 3 * (1 + 2 * off), 4 * (1 + off), 5])
-    task = SimpleNamespace(graph=graph, tip_factor=np.ones(6))
+    task = SimpleNamespace(graph=row, tip_factor=np.ones(6))
     cut = SimpleNamespace(steps=np.zeros(0, int), spread=9.0)
     (arc,) = growth._arcs(task, cut, SimpleNamespace(spread=9.0, falls=lambda _: falls))
     assert arc.path[0] == (2 if off == 1e-3 else 0)
+
+
+def test_a_path_ends_where_it_is_worth_most_by_what_is_to_be_kept_free_there(row):
+    """At the tip as anywhere: what is to be kept free beyond the end of a path is of no matter."""
+    taken = set()
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        free, falls = rng.uniform(0.1, 1, 6), np.cumsum(rng.uniform(0.5, 1, 5))
+        cut = SimpleNamespace(steps=np.zeros(0, int), spread=9.0)
+        model = SimpleNamespace(spread=9.0, falls=lambda _, falls=falls: falls)
+        (arc,) = growth._arcs(SimpleNamespace(graph=row, tip_factor=free), cut, model)
+        worth = [free[k] * falls[4 - k] / (5 - k) for k in range(3)]
+        assert arc.path[0] == np.argmax(worth) and arc.worth == pytest.approx(max(worth))
+        taken.add(int(arc.path[0]))
+    assert taken == {0, 1, 2}
 
 
 def test_arcs_are_worth_what_the_spread_falls_for_their_cost(coarse):

@@ -110,3 +110,11 @@ def test_parameters_of_points_beside_a_corner_are_those_of_the_corner(seed):
         s = polygon.boundary_parameter(corner + rng.random((200, 1)) * beyond)
         assert (s >= 0).all() and (s < polygon.period).all()
         np.testing.assert_allclose(s, polygon.start[k], atol=1e-12)
+
+
+def test_points_of_the_boundary_come_again_after_once_around(domain):
+    s = np.append(np.random.default_rng(3).uniform(0, domain.period, 50), 0.0)
+    for times in (-2, -1, 1, 3):
+        np.testing.assert_allclose(
+            domain.boundary_point(s + times * domain.period), domain.boundary_point(s), atol=1e-12
+        )
