@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bodies import icosphere
 
-from omt_uv.solver.contact.self_intersections import intersecting_pairs
+from omt_uv.solver.contact.self_intersections import FaceCrossings, intersecting_pairs
 
 
 def by_sampling(V, F):
@@ -37,12 +37,13 @@ def test_random_triangles_agree_with_brute_force():
 
 
 @pytest.mark.parametrize("size", [1e-20, 1e-4, 1e3, 1e20])
-def test_their_number_does_not_depend_on_size_and_place(size):
+@pytest.mark.parametrize("place", [[2.0, -1.0, 0.5], [3e4, 0, -1e4]])
+def test_their_number_does_not_depend_on_size_and_place(size, place):
     rng = np.random.default_rng(3)
     V, F = rng.uniform(-1, 1, (60, 3)), np.arange(60).reshape(-1, 3)
     pairs = intersecting_pairs(V, F)
     assert len(pairs) > 10
-    np.testing.assert_array_equal(intersecting_pairs(size * (V + [2.0, -1.0, 0.5]), F), pairs)
+    np.testing.assert_array_equal(intersecting_pairs(size * (V + place), F), pairs)
 
 
 def test_two_balls_and_one():
@@ -73,3 +74,30 @@ def test_pairs_are_the_same_however_vertices_and_triangles_are_numbered(seed):
         order, rows = rng.permutation(9), rng.permutation(len(F))
         again = intersecting_pairs(V[order], np.argsort(order)[F[rows]])
         assert {frozenset(rows[pair].tolist()) for pair in again} == found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_faces_in_one_plane_pass_however_it_lies(seed):
+    """Rounding puts their corners on either side of it."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    V = np.column_stack([rng.uniform(-1, 1, (90, 2)), np.zeros(90)]) @ turn.T + rng.normal(size=3)
+    assert not len(intersecting_pairs(V, np.arange(90).reshape(-1, 3)))
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_what_is_told_of_a_whole_fan_is_so_pair_by_pair(rounds, monkeypatch):
+    """Around a vertex that faces lie about once, where some of them fold over, or twice, where some have to cross."""
+    told = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        k = 5 * rounds
+        angle = 2 * np.pi * rounds * (np.arange(k) + rng.uniform(-0.4, 0.4, k) * rng.integers(1, 4)) / k
+        ring = rng.uniform(0.7, 1.3, (k, 1)) * np.column_stack([np.cos(angle), np.sin(angle), rng.uniform(-1, 1, k)])
+        V, F = np.concatenate([np.zeros((1, 3)), ring]), np.array([[0, 1 + i, 1 + (i + 1) % k] for i in range(k)])
+        found = intersecting_pairs(V, F)
+        with monkeypatch.context() as each:
+            each.setattr(FaceCrossings, "_side_by_side", lambda self, corner, asked: np.zeros(len(self._plain), bool))
+            np.testing.assert_array_equal(found, intersecting_pairs(V, F))
+        told.append(len(found) > 0)
+    assert all(told) if rounds == 2 else 5 < sum(told) < 60

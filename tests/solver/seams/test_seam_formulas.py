@@ -392,6 +392,34 @@ def test_a_path_ends_where_it_is_worth_most_by_what_is_to_be_kept_free_there(row
     assert taken == {0, 1, 2}
 
 
+@pytest.mark.parametrize("barred", [1, 3, 4])
+def test_a_path_may_end_where_it_leaves_what_is_to_be_kept_free(barred, row):
+    """However near to the cut that is."""
+    free = np.where(np.arange(6) < barred, 0.01, 1.0)
+    cut, falls = SimpleNamespace(steps=np.zeros(0, int), spread=9.0), np.arange(1.0, 6)
+    task = SimpleNamespace(graph=row, tip_factor=free)
+    (arc,) = growth._arcs(task, cut, SimpleNamespace(spread=9.0, falls=lambda _: falls))
+    assert arc.path[0] == barred and arc.worth == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_extremities_are_peaks_off_the_cut_that_are_worth_most(seed):
+    """On a row of vertices, some of which are cut, and some to be kept free."""
+    rng, n = np.random.default_rng(seed), 120
+    gain, scale, free, cost = rng.random(n), rng.normal(size=n), rng.uniform(0.01, 1, n), rng.uniform(0.5, 2, n)
+    cost[rng.random(n) < 0.2], cost[:3] = 0, np.inf
+    ends = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+    task = SimpleNamespace(graph=SimpleNamespace(ends=ends), tip_factor=free)
+    found = growth._tips(task, SimpleNamespace(gain=lambda _: gain, scale=scale), cost)
+    peaks = set()
+    for height in (np.where(cost > 0, gain, 0), np.where(cost > 0, np.abs(scale), 0)):
+        padded = np.concatenate([[0], height, [0]])
+        peaks |= {k for k in range(n) if height[k] > 0 and height[k] >= max(padded[k], padded[k + 2])}
+    worth = {k: gain[k] * free[k] / cost[k] for k in peaks if 0 < cost[k] < np.inf}
+    assert len(worth) > growth.MOST_TIPS
+    assert found.tolist() == sorted(worth, key=worth.__getitem__, reverse=True)[: growth.MOST_TIPS]
+
+
 def test_arcs_are_worth_what_the_spread_falls_for_their_cost(coarse):
     """By the model cut anew, for every arc that is offered; and those come first that are worth most."""
     from omt_uv.solver.seams.cut_tree import Task, cut_along
