@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from omt_uv.solver.contact import box_pairs as finding
 from omt_uv.solver.contact.box_pairs import box_pairs
 
 
@@ -35,3 +36,16 @@ def test_boxes_without_size_and_none_at_all():
     assert box_pairs(points, points, np.zeros(3, bool)).shape == (0, 2)
     far = np.array([[0.0, 0, 0], [1e12, 0, 0], [1e12, 0, 0]])
     assert box_pairs(far, far + 1e-9).tolist() == [[1, 2]]
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 7])
+def test_pairs_are_the_same_however_many_are_looked_at_together(block, monkeypatch):
+    """Also where just so many are left in the end."""
+    rng = np.random.default_rng(block)
+    low = rng.uniform(0, 1, size=(40, 3))
+    high = low + rng.uniform(0, 0.5, size=(40, 3))
+    expected = by_comparison(low, high)
+    monkeypatch.setattr(finding, "BLOCK", block)
+    for count in range(30, 41):
+        found = box_pairs(low[:count], high[:count])
+        assert sorted(found.tolist()) == [pair for pair in expected if max(pair) < count]

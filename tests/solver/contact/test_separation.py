@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from bodies import icosphere
 
 from omt_uv.solver.contact import separation
@@ -89,3 +90,15 @@ def test_planes_that_turn_stay_planes(monkeypatch):
     separated(V, after, F, intersecting_pairs(after, F), np.arange(len(V)) % 2 == 0)
     assert len(lengths) > 3
     np.testing.assert_allclose(np.concatenate(lengths), 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("longer", [1.0, 3.0, 8.0])
+def test_what_is_as_far_apart_as_it_was_is_let_alone_however_all_else_was_stretched(longer):
+    """A tip above the middle of a face, which the plane between them stays along."""
+    before = np.array([[-2.0, -1, 0], [2, -1, 0], [0, 2, 0], [0, 0, 0.01], [0.5, 0, 1], [-0.5, 0, 1]])
+    F, free = np.arange(6).reshape(2, 3), np.ones(6, bool)
+    after = before * [1, 1, longer]
+    for gap, stays in ((0.011, True), (0.005, False)):
+        after[3, 2] = gap
+        found = separated(before, after, F, np.array([[0, 1]]), free)
+        assert np.array_equal(found, after) == stays and not len(intersecting_pairs(found, F))

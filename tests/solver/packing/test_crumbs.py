@@ -67,3 +67,14 @@ def test_what_is_long_shows_however_thin_it_is():
     thin = [np.array([[0, 0], [0.5, 0], [0.5, 1e-7]]), np.array([[0, 0], [1e-7, 0], [0, 0.5]])]
     heaped = gathered([*points, *thin], [*triangles, TRIANGLE, TRIANGLE], 4, 1024)
     assert heaped.crumb.sum() == 800 and not heaped.crumb[-2:].any()
+
+
+@pytest.mark.parametrize("unit", [2.0**-20, 2.0**20])
+@pytest.mark.parametrize("size", [5e-4, 1e-2, 1e-12])
+def test_crumbs_are_the_same_in_every_unit(unit, size):
+    """Those as well that are so small that their size says nothing about how far apart they are to lie."""
+    points, triangles = mixed(1200, size=size)
+    plain, other = (gathered([u * p for p in points], triangles, 4, 1024) for u in (1.0, unit))
+    assert np.array_equal(other.crumb, plain.crumb) and plain.crumb.any() == (size < 1e-3)
+    for a, b in zip(plain.points, other.points, strict=True):
+        np.testing.assert_allclose(b / unit, a, rtol=1e-12)

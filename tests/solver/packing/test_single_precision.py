@@ -60,3 +60,20 @@ def test_vertices_that_move_at_once_share_no_triangle():
         found = single_precision._apart(vertices, triangles, 42, np.random.default_rng(seed))
         assert len(found) and np.isin(found, vertices).all() and len(np.unique(found)) == len(found)
         assert (np.isin(triangles, found).sum(axis=1) <= 1).all()
+
+
+def test_a_vertex_is_moved_only_where_fewer_of_its_faces_fold():
+    """However much more room there is beside it."""
+    moves = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        near = (0.6 + 2.0**-24 * rng.integers(-3, 4, (9, 2))).astype(np.float32).astype(float)
+        faces = np.array([[0, *rng.choice(np.arange(1, 9), 2, replace=False)] for _ in range(6)])
+        side, moving = rng.choice([-1.0, 1.0], 6), np.zeros(1, np.int64)
+        place = single_precision._bettered(near, faces, side, moving, np.zeros(6, np.int64), 3 * np.arange(6))
+        moved = near.copy()
+        moved[0] = place
+        before, after = ((signed_areas(uv, faces) * side <= 0).sum() for uv in (near, moved))
+        assert after < before or np.array_equal(moved, near)
+        moves += after < before
+    assert 5 < moves < 40
