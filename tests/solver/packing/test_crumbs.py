@@ -16,6 +16,8 @@ def mixed(count, seed=0, size=5e-4):
     for k in range(count):
         unit = 1.0 if k % 3 == 0 else size
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])[: 4 if k % 2 else 3]
+        # Any corner may come first.
+        corners = np.roll(corners, k // 3, axis=0)
         points.append(unit * corners * rng.uniform(0.4, 1, 2) ** 4 + rng.normal(size=2))
         triangles.append(QUAD if k % 2 else TRIANGLE)
     return points, triangles
