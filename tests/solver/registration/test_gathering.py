@@ -9,6 +9,7 @@ from meshes import polar
 
 from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.progress import drain
+from omt_uv.solver.registration import gathering
 from omt_uv.solver.registration.carriers import TargetCarrier
 from omt_uv.solver.registration.domains import Case, prepared
 from omt_uv.solver.registration.gathering import gathered
@@ -37,14 +38,20 @@ def missed(found, F, target):
     return np.sqrt(square.mean()) / np.linalg.norm(np.ptp(target, axis=0))
 
 
-def test_a_ball_that_few_faces_cover_gets_more():
-    P, F = icosphere(3)
-    Q, G, target = two_balls(5, 0.2)
+def ball_case(level: int):
+    """A ball on a body of two, and the places of its vertices."""
+    P, F = icosphere(level)
+    Q, G, target = two_balls(level + 2, 0.2)
     pairs = ([int(P[:, k].argmin()) for k in range(3)], [int(Q[:, k].argmin()) for k in range(3)])
     pair = prepared((P, F), (target, G), vertex_landmarks((pairs[0], F), (pairs[1], G)), "auto")
     carrier = TargetCarrier(pair.target.vertices, pair.target.triangles, Q, pair.loop)
-    before = carrier.place(P[pair.order])
-    after = drain(gathered(Case(pair, P[pair.order], carrier, None), before, CLOSE))
+    return Case(pair, P[pair.order], carrier, None), carrier.place(P[pair.order])
+
+
+def test_a_ball_that_few_faces_cover_gets_more():
+    case, before = ball_case(3)
+    pair, carrier, P = case.pair, case.carrier, icosphere(3)[0]
+    after = drain(gathered(case, before, CLOSE))
     beside = [missed(placed.positions, pair.triangles, pair.target.vertices) for placed in (before, after)]
     assert beside[1] < 0.6 * beside[0]
     assert not carrier.folded(after, pair.triangles).any()
@@ -78,3 +85,19 @@ def test_what_is_close_stays_as_it_is():
     np.testing.assert_array_equal(close.forward.barycentric, plain.forward.barycentric)
     with pytest.raises(ValueError, match="closeness"):
         RegistrationOptions(closeness=0.0)
+
+
+def test_the_best_of_all_rounds_is_what_is_given(monkeypatch):
+    """Though later ones went back to where all began."""
+    case, before = ball_case(2)
+    moved, calls = gathering._moved, []
+
+    def going_back(*given):
+        calls.append(len(calls) < 3 * gathering.MOVES)
+        return moved(*given) if calls[-1] else before
+
+    monkeypatch.setattr(gathering, "_moved", going_back)
+    after = drain(gathered(case, before, CLOSE))
+    assert not calls[-1]
+    beside = [missed(placed.positions, case.pair.triangles, case.pair.target.vertices) for placed in (before, after)]
+    assert beside[1] < 0.9 * beside[0]

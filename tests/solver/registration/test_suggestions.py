@@ -49,3 +49,13 @@ def test_no_place_that_stands_out_has_a_neighbour_that_does_more(turned):
     # Far enough apart for all of them to be taken.
     found = suggestions._peaks(value, 10 * V, F)
     assert sorted(found.tolist()) == np.flatnonzero(value >= highest).tolist()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_places_that_are_each_others_best_and_look_otherwise_are_no_pair(seed):
+    """As those of a body that is inside out, where all normals are against one another."""
+    V, F = blob(3, seed=seed)
+    found = suggest_landmarks((V, F), (V, F[:, ::-1]), 40)
+    assert (found.difference < suggestions.MOST_DIFFERENCE).all()
+    assert not set(zip(found.source.tolist(), found.target.tolist(), strict=True)) & {(v, v) for v in range(len(V))}
+    assert len(suggest_landmarks((V, F), (V, F), 40).source) > len(found.source)
