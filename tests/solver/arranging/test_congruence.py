@@ -67,3 +67,17 @@ def test_what_a_motion_takes_to_another_is_not_mirrored_although_a_reflection_do
         assert stacks(islands, mirrored=False).moved == 1
     lopsided = V + np.arange(len(V))[:, None] * [0, 0.1 * height, 0]
     assert matching(lopsided, F, lopsided * [1, -1, 1], F).mirrored == (height > 0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_vertex_is_that_of_one_alone_also_where_several_lie_in_one_place(seed):
+    """As at seams that were never joined: nobody could tell which of them is which."""
+    V, F = meshes.bumpy(6, 5)
+    rng = np.random.default_rng(seed)
+    doubled, faces = np.concatenate([V, V[:3]]), np.concatenate([F, [[len(V), len(V) + 1, len(V) + 2]]])
+    turned = doubled @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    for match in (matching(doubled, faces, turned, faces), matching(V, F, turned[: len(V)], F)):
+        assert match is None or len(np.unique(match.vertices)) == len(match.vertices)
+    assert match is not None
+    image = mirrored_match(doubled, faces, doubled * [1, 1, -1], faces[:, ::-1], np.array([0, 0, 1.0]), 0.0)
+    assert image is None or len(np.unique(image)) == len(doubled)

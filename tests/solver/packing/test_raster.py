@@ -152,7 +152,10 @@ def test_a_copy_of_a_raster_is_taken_by_itself():
     other = grid.copy()
     other.take(mask, 4, 5)
     assert other.taken.sum() == 9 and not grid.taken.any()
-    assert free_places(grid, mask).all() and not free_places(other, mask)[5, 4]
+    for _ in range(2):
+        assert not free_places(other, mask)[5, 4] and free_places(grid, mask).all()
+    grid.take(mask, 12, 11)
+    assert not free_places(grid, mask)[11, 12] and free_places(grid, mask)[5, 4] and free_places(other, mask)[11, 12]
 
 
 def test_placed_masks_share_no_cell():

@@ -101,3 +101,12 @@ def test_the_best_of_all_rounds_is_what_is_given(monkeypatch):
     assert not calls[-1]
     beside = [missed(placed.positions, case.pair.triangles, case.pair.target.vertices) for placed in (before, after)]
     assert beside[1] < 0.9 * beside[0]
+
+
+def test_what_has_no_face_around_it_stays():
+    case, before = ball_case(2)
+    some = case.pair.triangles[:12]
+    after = gathering._moved(case, before, some, np.arange(12.0), np.ones(len(before.domain), bool))
+    alone = np.setdiff1d(np.arange(len(before.domain)), some)
+    np.testing.assert_array_equal(after.domain[alone], before.domain[alone])
+    assert np.isfinite(after.positions).all() and (after.domain[some] != before.domain[some]).any()

@@ -59,3 +59,29 @@ def test_places_that_are_each_others_best_and_look_otherwise_are_no_pair(seed):
     assert (found.difference < suggestions.MOST_DIFFERENCE).all()
     assert not set(zip(found.source.tolist(), found.target.tolist(), strict=True)) & {(v, v) for v in range(len(V))}
     assert len(suggest_landmarks((V, F), (V, F), 40).source) > len(found.source)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pairs_are_the_same_from_either_side_and_fewer_are_the_first_of_more(seed):
+    V, F = blob(3, seed=seed)
+    other = V + 0.05 * np.sin(3 * V[:, [1, 2, 0]])
+    found, back = suggest_landmarks((V, F), (other, F), 40), suggest_landmarks((other, F), (V, F), 40)
+    assert len(found.source) > 5 and (np.diff(found.difference) >= 0).all()
+    for side in (found.source, found.target):
+        assert len(np.unique(side)) == len(side)
+    assert found.source.tolist() == back.target.tolist() and found.target.tolist() == back.source.tolist()
+    few = suggest_landmarks((V, F), (other, F), 4)
+    assert few.source.tolist() == found.source[:4].tolist() and few.target.tolist() == found.target[:4].tolist()
+
+
+@pytest.mark.parametrize("size", [0.2, 0.3])
+def test_of_places_near_each_other_the_one_that_stands_out_most_is_taken(size):
+    V, F = meshes.grid(9, 9)
+    value, place = np.random.default_rng(1).random(len(V)), size * V
+    found, every = suggestions._peaks(value, place, F), suggestions._peaks(value, 10 * V, F)
+    assert 0 < len(found) < len(every) < suggestions.PEAKS and set(found) < set(every)
+    away = np.linalg.norm(place[every][:, None] - place[found], axis=2)
+    near = away <= suggestions.APART
+    assert (near[np.isin(every, found)].sum(axis=1) == 1).all()
+    # What is left out has a greater one beside it.
+    assert (near & (value[found] >= value[every][:, None])).any(axis=1).all()
