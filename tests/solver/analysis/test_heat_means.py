@@ -66,3 +66,15 @@ def test_vertices_of_no_area_are_left_alone_in_any_unit(size):
     found = HeatMeans(size * V, F, size * 0.2).means(size**2 * amount, size * SIGMAS)
     np.testing.assert_allclose(found, plain, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(plain[:, :-1], HeatMeans(V[:-1], F, 0.2).means(amount[:-1], SIGMAS), rtol=1e-6)
+
+
+@pytest.mark.parametrize("stretch", [1.0, 6.0, 30.0])
+def test_means_of_what_is_nowhere_negative_are_so_too_whatever_the_angles(stretch):
+    """And nowhere more than the most: heat flows from hot to cold across obtuse triangles as well."""
+    V, F = meshes.random_disk(150)
+    V = V * [stretch, 1, 1]
+    area = vertex_areas(V, F)
+    for k in (3, 40, 90):
+        density = np.where(np.arange(len(V)) == k, 1.0, 0.0)
+        found = HeatMeans(V, F, 0.2).means(density * area, SIGMAS)
+        assert found.min() > -2e-3 and found.max() < 1 + 2e-3

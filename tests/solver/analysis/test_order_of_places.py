@@ -66,3 +66,30 @@ def test_the_order_of_rows_is_that_of_their_columns(bits):
     rng = np.random.default_rng(0)
     columns = [rng.integers(0, 1 << b, 500) for b in bits]
     assert (order_of_rows(*columns) == np.lexsort(columns[::-1])).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_along_a_cut_rounding_of_what_lies_around_decides_nothing(seed):
+    """Both sides of a tube that is cut open are mirror images: only across the cut are their triangles elsewhere."""
+    rows, around = 7, 12
+    turn, height = np.meshgrid(2 * np.pi * np.arange(around + 1) / around, np.linspace(0, 3.1, rows))
+    V = np.column_stack([1.3 * np.cos(turn.ravel()), np.sin(turn.ravel()), height.ravel()])
+    V[around :: around + 1] = V[:: around + 1]
+    F = meshes.grid(around, rows - 1)[1]
+    order, rng = order_of_places(V, F), np.random.default_rng(seed)
+    for _ in range(5):
+        shuffle = rng.permutation(len(V))
+        other = np.argsort(shuffle)[np.roll(F, rng.integers(3), axis=1)][rng.permutation(len(F))]
+        assert np.array_equal(shuffle[order_of_places(V[shuffle], other)], order)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_points_nearer_to_each_other_than_cells_are_wide_have_an_order_of_their_own(seed):
+    """Though no triangle tells them apart."""
+    rng = np.random.default_rng(seed)
+    V, F = meshes.head()
+    close = V[7] + 1e-9 * np.ptp(V, axis=0) * rng.random((20, 3))
+    points = np.concatenate([V, close])
+    shuffle = np.concatenate([np.arange(len(V)), len(V) + rng.permutation(20)])
+    found, other = order_of_places(points, F), order_of_places(points[shuffle], F)
+    assert np.array_equal(points[found], points[shuffle][other])

@@ -114,3 +114,15 @@ def test_tetrahedra_the_wrong_way_are_turned_and_no_others():
     turned = turned_right(points, tets[:, [0, 1, 3, 2]])
     np.testing.assert_array_equal(np.sort(turned, axis=1), np.sort(tets, axis=1))
     np.testing.assert_allclose(tet_volumes(points, turned), np.abs(volume))
+
+
+def test_what_is_the_right_way_as_a_whole_is_not_turned_for_the_sake_of_slivers():
+    body = np.random.default_rng(1).normal(size=(6, 3))
+    tets = np.array([[0, 1, 2, 3], [1, 2, 3, 4], [2, 3, 4, 5]])
+    volume = tet_volumes(body, tets)
+    tets = np.where((volume < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
+    smallest = np.abs(volume).argmin()
+    tets[smallest] = tets[smallest, [0, 2, 1, 3]]
+    np.testing.assert_array_equal(turned_right(body, tets), tets)
+    again = turned_right(body, tets[:, [0, 2, 1, 3]])
+    np.testing.assert_allclose(tet_volumes(body, again), tet_volumes(body, tets))
