@@ -164,6 +164,14 @@ class Pair:
         """Descriptors (n,c) of the source's vertices and (k,c) of the target's."""
         return descriptors(self.vertices, self.triangles), descriptors(self.target.vertices, self.target.triangles)
 
+    @cached_property
+    def spectra(self) -> tuple[np.ndarray, np.ndarray]:
+        """As many eigenfunctions (n,c) of the source as (k,c) of the target."""
+        first = eigenfunctions(self.vertices, self.triangles)
+        second = eigenfunctions(self.target.vertices, self.target.triangles)
+        count = min(first.shape[1], second.shape[1])
+        return first[:, :count], second[:, :count]
+
 
 def prepared(source, target, landmarks: Landmarks, domain: str) -> Pair:
     """Holes filled, landmarks made vertices, sizes alike, vertices in the order of elimination.
@@ -212,15 +220,6 @@ class Case:
     def targets(self) -> InPlace:
         """The places of the landmarks."""
         return self.carrier.at(*self.pair.targets)
-
-    @cached_property
-    def spectra(self) -> tuple[np.ndarray, np.ndarray]:
-        """As many eigenfunctions (n,c) of the source as (k,c) of the target."""
-        target = self.pair.target
-        first = eigenfunctions(self.pair.vertices, self.pair.triangles)
-        second = eigenfunctions(target.vertices, target.triangles)
-        count = min(first.shape[1], second.shape[1])
-        return first[:, :count], second[:, :count]
 
     def domain_carrier(self, loop: np.ndarray) -> SphereCarrier | DiskCarrier:
         """The domain as a carrier, for a mesh with vertices (k,) on its circle."""

@@ -4,6 +4,9 @@ The domain flows in small steps. In each, a smooth field takes every landmark pa
 kernels at the landmarks, with coefficients from one linear system (as Hu, Zou, Hua 2014, section 5, whose field is
 steady and contradicts itself where paths cross; a system a step does not). A smooth flow folds nothing; where the mesh
 is too coarse for it, vertices stay behind. Then the mesh relaxes, with the landmarks held where they are.
+
+Many points whose places are known roughly are followed by a flow that is smoother than they are: wide kernels first,
+and a ridge, so that a point which is wrong, or which the others contradict, bends little.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..mesh.spherical_geometry import normalized
 from ..progress import Progress, Steps
 from .carriers import InPlace
 from .surface_newton import LOOSE, Deformation, minimise_on, without_folds
@@ -32,6 +36,17 @@ WIDTH = 1.0
 WIDEST = 1.0
 # Added to the diagonal of the kernels' matrix.
 RIDGE = 1e-8
+# Widths of the kernels that follow many points, one after the other, and what is added to their diagonal, as a share of
+# how many points they reach.
+FOLLOWING = (0.6, 0.4)
+SMOOTHNESS = 0.3
+# How much nearer or farther two points get, relative to their distance, in a step, and in all steps that are left to do
+# where a width has done what it can; steps of a width at most.
+BEND = 0.3
+STILL = 0.02
+MOST_FOLLOWING = 40
+# Vertices that are moved at once, times points.
+CHUNK = 1 << 21
 
 
 @dataclass(frozen=True)
@@ -99,3 +114,50 @@ def put_landmarks(
         if not problem.carrier.folded(trial, around).any():
             placed, met[k] = trial, True
     return placed, met
+
+
+def follow_points(domain: np.ndarray, points: np.ndarray, places: np.ndarray) -> Steps[np.ndarray]:
+    """Unit vectors (n,3) carried by a smooth flow that takes the points (k,) of them near to places (k,3).
+
+    Where triangles are large next to what the flow bends, they may fold.
+    """
+    for width in FOLLOWING:
+        for k in range(MOST_FOLLOWING):
+            yield Progress("Functional maps", k / MOST_FOLLOWING)
+            at = domain[points]
+            kernel = _kernel(at, at, width)
+            ridge = SMOOTHNESS * np.median(kernel.sum(axis=1))
+            factor = np.linalg.solve(kernel + ridge * np.eye(len(at)), _geodesics(at, places))
+            bend = _bend(at, kernel @ factor, width)
+            if bend < STILL:
+                break
+            share = min(1.0, BEND / bend)
+            parts = np.array_split(domain, -(-len(domain) * len(at) // CHUNK))
+            domain = np.concatenate([_moved(part, share * (_kernel(part, at, width) @ factor)) for part in parts])
+    return domain
+
+
+def _kernel(at: np.ndarray, points: np.ndarray, width: float) -> np.ndarray:
+    """Gaussian kernels (n,k) of unit vectors (k,3), at unit vectors (n,3)."""
+    return np.exp(-np.maximum(2 - 2 * at @ points.T, 0) / width**2)
+
+
+def _geodesics(at: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Tangents (k,3) at unit vectors (k,3) that lead to others (k,3), as long as the way is."""
+    cosine = np.einsum("kd,kd->k", at, places)
+    along = places - cosine[:, None] * at
+    sine = np.linalg.norm(along, axis=1)
+    return along * (np.arctan2(sine, cosine) / np.maximum(sine, 1e-12))[:, None]
+
+
+def _bend(at: np.ndarray, field: np.ndarray, width: float) -> float:
+    """The greatest difference of a field (k,3) at two of the points (k,3), over their distance, or half of the width
+    where they are nearer."""
+    square = np.maximum(2 - 2 * at @ at.T, (width / 2) ** 2)
+    size = (field**2).sum(axis=1)
+    return float(np.sqrt(np.maximum((size[:, None] + size - 2 * field @ field.T) / square, 0).max()))
+
+
+def _moved(at: np.ndarray, field: np.ndarray) -> np.ndarray:
+    """Unit vectors (n,3) moved along a field (n,3), as far as it is tangent."""
+    return normalized(at + field - np.einsum("nd,nd->n", at, field)[:, None] * at)

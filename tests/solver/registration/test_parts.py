@@ -23,14 +23,14 @@ from omt_uv.solver.mesh.spherical_geometry import fibonacci_sphere, normalized, 
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
-from omt_uv.solver.registration import alignment
+from omt_uv.solver.registration import alignment, landmark_flow
 from omt_uv.solver.registration import coarse_start as coarse_start_module
 from omt_uv.solver.registration.carriers import DiskCarrier, SphereCarrier, TargetCarrier
 from omt_uv.solver.registration.coarse_meshes import coarse_mesh, far_vertices, laid_out, straightened
 from omt_uv.solver.registration.coarse_start import coarse_start
 from omt_uv.solver.registration.domains import Case, checked, filled, kind_of, prepared
 from omt_uv.solver.registration.functional_maps import descriptors, eigenfunctions, refined_correspondence
-from omt_uv.solver.registration.landmark_flow import draw_landmarks
+from omt_uv.solver.registration.landmark_flow import draw_landmarks, follow_points
 from omt_uv.solver.registration.landmarks import split_at, vertex_landmarks
 from omt_uv.solver.registration.straight_walks import StraightWalks
 from omt_uv.solver.registration.suggestions import suggest_landmarks
@@ -300,6 +300,47 @@ def test_landmarks_flow_to_their_places_on_the_sphere():
     found = drain(draw_landmarks(problem_on(carrier, P, F), start, vertices, targets))
     assert found.met.all() and not carrier.folded(found.placed, F).any()
     assert np.abs(found.placed.positions[vertices] - targets.positions).max() < 1e-12
+
+
+def swirled(P, turns):
+    """Points of the sphere turned about the third axis, the farther the nearer they are to its middle."""
+    angle = turns * (1 - P[:, 2] ** 2)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.column_stack([cosine * P[:, 0] - sine * P[:, 1], sine * P[:, 0] + cosine * P[:, 1], P[:, 2]])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_flow_follows_points_without_folds_and_turned_and_mirrored_alike(seed):
+    P, F = icosphere(4)
+    points = np.random.default_rng(seed).permutation(len(P))[:300]
+    places = swirled(P[points], 0.6)
+    found = drain(follow_points(P, points, places))
+    assert np.allclose(np.linalg.norm(found, axis=1), 1)
+    assert signed_volumes(found, F).min() > 0
+    before, after = (np.linalg.norm(x - swirled(P, 0.6), axis=1).mean() for x in (P, found))
+    assert after < 0.25 * before
+    for R in (random_rotation(seed), np.diag([1.0, -1, 1])):
+        assert np.allclose(drain(follow_points(P @ R.T, points, places @ R.T)), found @ R.T, atol=1e-9)
+
+
+def test_a_flow_stays_where_points_are_in_their_places_and_bends_little_for_a_wrong_one():
+    P, F = icosphere(4)
+    points = np.random.default_rng(7).permutation(len(P))[:300]
+    assert np.allclose(drain(follow_points(P, points, P[points])), P, atol=1e-12)
+    places = P[points].copy()
+    places[0] = -places[0]
+    found = drain(follow_points(P, points, places))
+    assert signed_volumes(found, F).min() > 0
+    assert np.linalg.norm(found - P, axis=1).mean() < 0.05
+
+
+def test_what_a_flow_moves_at_once_does_not_count(monkeypatch):
+    P, _ = icosphere(3)
+    points = np.arange(0, len(P), 7)
+    places = swirled(P[points], 0.5)
+    whole = drain(follow_points(P, points, places))
+    monkeypatch.setattr(landmark_flow, "CHUNK", 1000)
+    assert np.allclose(drain(follow_points(P, points, places)), whole, atol=1e-12)
 
 
 def test_newton_on_a_surface_undoes_a_disturbance():

@@ -3,6 +3,7 @@ is polished again."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import meshes
@@ -296,7 +297,8 @@ def test_large_surfaces_begin_on_a_coarse_mesh(count, coarse, sphere, monkeypatc
     pair = SimpleNamespace(
         vertices=np.zeros((count, 3)), domain="sphere" if sphere else "disk", landmarks=None, loop=None
     )
-    found, fractions = told(coarse_start.coarse_start(SimpleNamespace(pair=pair, aligned=None)))
+    case = SimpleNamespace(pair=pair, aligned=None)
+    found, fractions = told(coarse_start._begun(case, coarse_start._few(case)))
     assert calls == ["coarse" if coarse else "whole"]
     assert found == (("carried" if coarse else "whole", "better" if sphere else "polished"), "met", 9 if sphere else 8)
     assert fractions == pytest.approx([0, 0.2, 0.2, 0.4] + [0.4, 0.8] * sphere)
@@ -405,11 +407,60 @@ def test_large_sources_begin_with_few_vertices_and_spheres_are_improved(count, c
     monkeypatch.setattr(coarse_start, "_finished", lambda case, moved, met, steps: done((moved, met, steps), 1.0))
     kind = coarse_start.SPHERE if domain == "sphere" else "disk"
     pair = SimpleNamespace(vertices=np.zeros((n, 3)), landmarks=None, loop=None, domain=kind)
-    found, fractions = told(coarse_start.coarse_start(SimpleNamespace(pair=pair, aligned="aligned")))
+    case = SimpleNamespace(pair=pair, aligned="aligned")
+    found, fractions = told(coarse_start._begun(case, coarse_start._few(case)))
     assert used == (["few"] if coarse and made else ["whole"]) and asked == [coarse_start.COARSE] * coarse
     last = ("improved", "all", 75) if domain == "sphere" else ("polished", "met", 12)
     assert found == (("carried", last[0], "aligned"), *last[1:])
     assert fractions == pytest.approx([0, 0.2, 0.2, 0.4, *((0.4, 0.8) if domain == "sphere" else ()), 1])
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A case whose starts are counted: bent or not."""
+
+    pair: SimpleNamespace
+    carrier: SimpleNamespace
+    bent: bool = False
+
+
+# Of the plain start and the bent one: distortion, how far from functional maps, landmarks met; whether the latter wins.
+STARTS = {
+    "nearer": ((0.2, 0.4, 2), (0.3, 0.2, 2), True),
+    "more distorted than nearer": ((0.2, 0.4, 2), (0.5, 0.2, 2), False),
+    "fewer met": ((0.2, 0.4, 2), (0.1, 0.1, 1), False),
+    "more met": ((0.2, 0.4, 1), (0.9, 0.9, 2), True),
+    "good but not met": ((0.001, 0.4, 1), (0.9, 0.9, 2), True),
+    "good": ((0.001, 0.4, 2), None, False),
+}
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_of_a_start_and_of_one_that_was_bent_the_better_one_is_taken(name, monkeypatch):
+    plain, other, bent_wins = STARTS[name]
+    rows, asked = {False: plain, True: other}, []
+
+    def begun(case, mesh):
+        distortion, off, met = rows[case.bent]
+        places = SimpleNamespace(domain=np.full((9, 3), off), distortion=distortion)
+        return done(Drawn(places, np.arange(2) < met, 10 * (1 + case.bent)), 1.0)
+
+    def bent(case, vertices, places):
+        asked.append((vertices.tolist(), len(places)))
+        return done(replace(case, bent=True), 1.0)
+
+    monkeypatch.setattr(coarse_start, "_few", lambda case: SimpleNamespace(chosen=np.arange(3), domain="own"))
+    monkeypatch.setattr(coarse_start, "_begun", begun)
+    monkeypatch.setattr(coarse_start, "_distortion", lambda case, drawn: drawn.placed.distortion)
+    monkeypatch.setattr(coarse_start, "_sampled", lambda *_: done((np.arange(5), np.zeros((5, 3))), 1.0))
+    monkeypatch.setattr(coarse_start, "_bent", bent)
+    carrier = SimpleNamespace(place=lambda places: SimpleNamespace(positions=places))
+    case = Begun(SimpleNamespace(domain=coarse_start.SPHERE), carrier)
+    found, fractions = told(coarse_start.coarse_start(case))
+    assert found.placed.distortion == (other if bent_wins else plain)[0]
+    assert found.steps == (10 if name == "good" else 30)
+    assert asked == ([] if name == "good" else [([0, 1, 2], 3)])
+    assert fractions == pytest.approx([0.4] if name == "good" else [0.4, 0.5, 0.6, 1.0])
 
 
 @pytest.mark.parametrize("met", [[True, False], [True, True], [False, False]])
@@ -484,11 +535,10 @@ def test_functional_maps_take_every_coarse_vertex_where_it_corresponds_to_in_wha
         landmarks=chosen[marks],
         targets=(np.zeros(2, int), np.eye(3)[:2]),
         target=SimpleNamespace(triangles=F),
+        spectra=(number, number),
     )
     targets = SimpleNamespace(domain=np.full((2, 3), 9.0))
-    case = SimpleNamespace(
-        pair=pair, spectra=(number, number), carrier=SimpleNamespace(domain=V), aligned=V, targets=targets
-    )
+    case = SimpleNamespace(pair=pair, carrier=SimpleNamespace(domain=V), aligned=V, targets=targets)
     mesh = SimpleNamespace(chosen=chosen, landmarks=marks, carried=lambda start, at: at)
 
     def itself(source, other, near, landmarks):
