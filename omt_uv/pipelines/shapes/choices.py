@@ -10,7 +10,7 @@ MATCH_MODES = (
     ("CHECKER", "Checker", "Colours on both objects that show what corresponds"),
 )
 MATCH_DOMAINS = (
-    ("AUTO", "Automatic", "The disk where both are open, the sphere otherwise"),
+    ("AUTO", "Automatic", "The disk where both are open by more than a small hole, the sphere otherwise"),
     ("SPHERE", "Sphere", "All holes are closed for the match"),
     ("DISK", "Disk", "Both keep their longest boundary, which slides along the other"),
     ("CHARTS", "Charts Cut Alike", "Any topology: seams cut both into disks that correspond, and go onto one another"),

@@ -39,6 +39,9 @@ DISK = "disk"
 AUTO = "auto"
 CHARTS = "charts"
 DOMAINS = (AUTO, SPHERE, DISK, CHARTS)
+# The square of a boundary over the area up to which it is a hole in a body, as a mouth or a neck of one with arms and
+# legs: a disk with so short a boundary has limbs, which no map of it to the plane has room for. Heads have 0.5 or more.
+SMALL_OPENING = 0.1
 
 
 @dataclass(frozen=True)
@@ -54,11 +57,22 @@ class FilledSurface:
     loop: np.ndarray
 
 
-def kind_of(source: np.ndarray, target: np.ndarray, domain: str) -> str:
-    """The domain for triangles (m,3) of a source and a target: a sphere where one of them is closed."""
+def kind_of(source: tuple[np.ndarray, np.ndarray], target: tuple[np.ndarray, np.ndarray], domain: str) -> str:
+    """The domain for a source (n,3), (m,3) and a target: the disk where both are open by more than a small hole."""
     if domain != AUTO:
         return domain
-    return DISK if len(boundary_edges(source)) and len(boundary_edges(target)) else SPHERE
+    return DISK if all(_opening(*surface) > SMALL_OPENING for surface in (source, target)) else SPHERE
+
+
+def _opening(vertices: np.ndarray, triangles: np.ndarray) -> float:
+    """The square of the longest boundary over the area of a surface (n,3), (m,3): 4 pi of a disk, 0 of a closed one."""
+    around = (_around(vertices, loop) for loop in boundary_loops(triangles))
+    return max(around, default=0.0) ** 2 / max(float(face_areas(vertices, triangles).sum()), 1e-300)
+
+
+def _around(vertices: np.ndarray, loop: np.ndarray) -> float:
+    """How long a closed line through vertices (k,) is."""
+    return float(np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum())
 
 
 def checked(vertices: np.ndarray, triangles: np.ndarray, name: str) -> None:
@@ -107,7 +121,7 @@ def filled(surface: tuple[np.ndarray, np.ndarray], domain: str, name: str) -> Fi
     """
     vertices, triangles = surface
     loops = boundary_loops(triangles)
-    lengths = [np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum() for loop in loops]
+    lengths = [_around(vertices, loop) for loop in loops]
     outer = np.zeros(0, np.int64)
     if domain == DISK:
         if not loops:
@@ -178,7 +192,7 @@ def prepared(source, target, landmarks: Landmarks, domain: str) -> Pair:
 
     source, target : vertices (n,3) and triangles (m,3). Raises LandmarkError, TopologyMismatchError, ZeroAreaFaceError.
     """
-    domain = kind_of(source[1], target[1], domain)
+    domain = kind_of(source, target, domain)
     first, second = filled(source, domain, "source"), filled(target, domain, "target")
     sizes = [np.sqrt(face_areas(surface.vertices, surface.triangles).sum()) for surface in (first, second)]
     if not min(sizes) > 0:

@@ -21,7 +21,7 @@ class RegistrationOptions:
     """How two surfaces are matched.
 
     domain : "sphere", which closes all holes; "disk", which keeps the longest boundary; "auto": a disk where both have
-        a boundary; "charts": the disks that seams cut both into, for surfaces of any topology
+        one that is more than a small hole; "charts": the disks that seams cut both into, for surfaces of any topology
     balance : of the maps to the domain, 0 for exact areas to 1 for the least shear
     mirrored : match the mirror image of the source
     polish : whether the map is optimised on the surfaces, too

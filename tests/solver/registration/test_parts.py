@@ -186,7 +186,26 @@ def test_holes_are_filled_but_for_the_boundary_of_a_disk():
     checked(W, G, "source")
     disk, sphere = filled((W, G), "disk", "source"), filled((W, G), "sphere", "source")
     assert (disk.holes, sphere.holes) == (1, 2) and len(disk.loop) == 24
-    assert kind_of(G, F, "auto") == "disk" and kind_of(G, icosphere(0)[1], "auto") == "sphere"
+    assert kind_of((W, G), (V, F), "auto") == "disk" and kind_of((W, G), icosphere(0), "auto") == "sphere"
+
+
+@pytest.mark.parametrize("unit", [1e-8, 1.0, 1e8])
+def test_a_small_hole_makes_no_disk_of_a_body(unit):
+    P, F = icosphere(4)
+    kinds = [opened(P, F, height) for height in (0.4, 0.9, 0.999)]
+    # Openings of 9, 1.2 and 0.01 times the root of the area, squared.
+    for hole, of_closed in zip(kinds, ("disk", "disk", "sphere"), strict=True):
+        scaled = (unit * hole[0], hole[1])
+        for other in kinds[:2]:
+            assert kind_of(scaled, other, "auto") == kind_of(other, scaled, "auto") == of_closed
+        assert kind_of(scaled, (P, F), "auto") == "sphere" and kind_of(scaled, scaled, "disk") == "disk"
+
+
+def opened(P, F, height):
+    """A ball without the faces that are wholly above a height, its vertices renumbered."""
+    F = F[~(P[F][:, :, 2] > height).all(axis=1)]
+    used, place = np.unique(F, return_inverse=True)
+    return P[used], place.reshape(F.shape)
 
 
 def test_descriptors_do_not_change_with_place_and_size():
